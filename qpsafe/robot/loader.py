@@ -1,0 +1,167 @@
+"""Robots by name, by folder, or by a bare MJCF or URDF file."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from qpsafe.errors import RobotFileError
+from qpsafe.robot.dh import dh_frames
+from qpsafe.robot.model_file import read_model, spec_from_model
+from qpsafe.robot.robot import Robot
+from qpsafe.robot.schema import RobotFile, read_robot_file
+from qpsafe.robot.spec import RobotSpec, Tool
+
+_TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
+
+
+def bundled_robots() -> list[str]:
+    """Names of the robots that come with qpsafe, sorted."""
+    return sorted(entry.name for entry in _bundled_folder().iterdir() if (entry / "robot.toml").is_file())
+
+
+def load_robot(
+    name_or_path: str | Path,
+    *,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    max_velocity: ArrayLike | None = None,
+    max_acceleration: ArrayLike | None = None,
+    home: ArrayLike | None = None,
+) -> Robot:
+    """Load a robot.
+
+    Args:
+        name_or_path: A bundled name (see [`bundled_robots`][]), the path of a robot folder (with `robot.toml`), or an
+            MJCF or URDF file, from which limits, frames and a wire through the joint origins are taken as they are.
+        lower: Lower position limits for a bare model file, one number or (n,) [rad].
+        upper: Upper position limits for a bare model file, one number or (n,) [rad].
+        max_velocity: Speed limits for a bare model file (MJCF has none), one number or (n,) [rad/s].
+        max_acceleration: Acceleration limits for a bare model file, one number or (n,) [rad/s^2]; 10 if not given.
+        home: Home pose for a bare model file, (n,) [rad]; zero, moved inside the limits, if not given.
+
+    Returns:
+        The robot.
+
+    Raises:
+        RobotFileError: There is no such robot, or one of its files is wrong; names file, key and value.
+    """
+    overrides = {
+        "lower": lower,
+        "upper": upper,
+        "max_velocity": max_velocity,
+        "max_acceleration": max_acceleration,
+        "home": home,
+    }
+    given = {key: value for key, value in overrides.items() if value is not None}
+    path = _find(name_or_path)
+    if path.suffix == ".toml":
+        for key, value in given.items():
+            raise RobotFileError("load_robot", key, value, f"nothing: {path} states the limits; edit it instead")
+        return _load_folder(path)
+    model = read_model(path)
+    return Robot(spec_from_model(path, model, given), model)
+
+
+def _bundled_folder() -> Path:
+    return Path(str(files("qpsafe.robots")))
+
+
+def _find(name_or_path: str | Path) -> Path:
+    """The robot.toml or model file that is meant."""
+    bundled = bundled_robots()
+    if str(name_or_path) in bundled:
+        return _bundled_folder() / str(name_or_path) / "robot.toml"
+    path = Path(name_or_path)
+    if path.is_dir():
+        return path / "robot.toml"
+    if path.is_file():
+        return path
+    expected = f"a bundled robot ({', '.join(bundled)}), or the path of a robot folder, an MJCF or a URDF file"
+    raise RobotFileError("load_robot", "name_or_path", str(name_or_path), expected)
+
+
+def _load_folder(path: Path) -> Robot:
+    file = read_robot_file(path)
+    model_path = path.parent / file.model
+    if not model_path.is_file():
+        raise RobotFileError(path, "model", file.model, "a file in the same folder")
+    model = read_model(model_path)
+    robot = Robot(_to_spec(path, file, model), model)
+    _check_kinematics(path, robot)
+    return robot
+
+
+def _to_spec(path: Path, file: RobotFile, model: Any) -> RobotSpec:
+    """The file in SI units and in the order of the model's joints; checks joints and frames against the model."""
+    names = list(model.names)[1:]  # 0 is pinocchio's universe
+    for name in names:
+        if name not in file.joints:
+            raise RobotFileError(path, f"joints.{name}", None, f"limits of this joint of {file.model}: it is missing")
+    for name in file.joints:
+        if name not in names:
+            raise RobotFileError(path, f"joints.{name}", name, f"a joint of {file.model}: {', '.join(names)}")
+    for name, target in file.frames.items():
+        if not model.existFrame(target):
+            expected = f"a site or body of {file.model} that moves, or a fixed body"
+            raise RobotFileError(path, f"frames.{name}", target, expected)
+
+    rad, m = file.units.radians, file.units.metres
+    joints = [file.joints[name] for name in names]
+    home = dict(zip(file.joints, file.home, strict=True))
+    for i, (name, joint) in enumerate(zip(names, joints, strict=True)):
+        low, high = model.lowerPositionLimit[i], model.upperPositionLimit[i]
+        for key, value in (("lower", joint.lower), ("upper", joint.upper)):
+            if not low - _TOLERANCE <= value * rad <= high + _TOLERANCE:
+                expected = (
+                    f"within the joint's range in {file.model}, {low / rad:g} to {high / rad:g} {file.units.angle}"
+                )
+                raise RobotFileError(path, f"joints.{name}.{key}", value, expected)
+    tool = file.tool
+    table = file.denavit_hartenberg
+    spots = None if file.spots is None else path.parent / file.spots
+    return RobotSpec(
+        name=file.name,
+        title=file.title,
+        manufacturer=file.manufacturer,
+        folder=path.parent,
+        model_path=path.parent / file.model,
+        spots_path=spots if spots is not None and spots.is_file() else None,
+        joint_names=tuple(names),
+        lower=rad * np.array([joint.lower for joint in joints]),
+        upper=rad * np.array([joint.upper for joint in joints]),
+        max_velocity=rad * np.array([joint.max_velocity for joint in joints]),
+        max_acceleration=rad * np.array([joint.max_acceleration for joint in joints]),
+        home=rad * np.array([home[name] for name in names]),
+        frames=dict(file.frames),
+        wire_frames=tuple((start, end) for start, end in file.wire.links),
+        tool=None if tool is None else Tool(tool.frame, tool.mounted_on, m * np.array(tool.offset), tool.mass),
+        dh=None if table is None else np.array([[rad * r.theta, m * r.d, m * r.a, rad * r.alpha] for r in table.rows]),
+        dh_frames=() if table is None else tuple(table.frames),
+    )
+
+
+def _check_kinematics(path: Path, robot: Robot) -> None:
+    """The table and the tool of robot.toml must say what the model says, else one of them is wrong."""
+    rng = np.random.default_rng(0)
+    for q in (robot.home, *rng.uniform(robot.lower, robot.upper, (3, robot.nq))):
+        state = robot.at(q)
+        if robot.dh is not None:
+            for i, (frame, pose) in enumerate(zip(robot.dh_frames, dh_frames(robot.dh, q), strict=True)):
+                error = np.abs(state.pose(frame) - pose).max()
+                if not error < _TOLERANCE:
+                    key = f"denavit_hartenberg.rows[{max(i - 1, 0)}]"
+                    expected = f"the pose of frame {frame} in {robot.model_path.name}; they differ by {error:.3g}"
+                    raise RobotFileError(path, key, (robot.dh[max(i - 1, 0)]).tolist(), expected)
+        if robot.tool is not None:
+            mount = state.pose(robot.tool.mounted_on)
+            offset = mount[:3, :3].T @ (state.position(robot.tool.frame) - mount[:3, 3])
+            if not np.abs(offset - robot.tool.offset).max() < _TOLERANCE:
+                expected = (
+                    f"{np.round(offset, 6).tolist()} m, where {robot.model_path.name} has frame {robot.tool.frame}"
+                )
+                raise RobotFileError(path, "tool.offset", robot.tool.offset.tolist(), expected)

@@ -1,0 +1,149 @@
+"""The robot as the controller sees it: joints with limits, frames with poses and Jacobians, and a wire model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.robot.spec import RobotSpec, Tool
+from qpsafe.robot.state import RobotState
+from qpsafe.robot.wire import Wire
+
+
+class Robot:
+    """Kinematics and limits of one robot; SI units, world frame = the model's world.
+
+    Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick and ask the state.
+
+    Attributes:
+        name: Short name.
+        title: Name for people.
+        folder: Folder of its files.
+        model_path: Its MJCF or URDF file.
+        nq: Number of joints, n.
+        joint_names: (n,) names, base to tip.
+        lower: Lower position limits, (n,) [rad], read-only like all arrays here.
+        upper: Upper position limits, (n,) [rad].
+        max_velocity: Speed limits, (n,) [rad/s].
+        max_acceleration: Acceleration limits, (n,) [rad/s^2].
+        home: A pose to start from, (n,) [rad].
+        frame_names: Names that `pose` and `jacobian` accept.
+        wire_frames: Start and end frame of each segment of the wire model.
+        wire_end_frames: The different frames in `wire_frames`, base to tip.
+        wire_indices: Places of the start and of the end frames of the segments in `wire_end_frames`, two (links,) arrays.
+        wire_end_ids: pinocchio's indices of `wire_end_frames`.
+        tool: The mounted tool, or None.
+        dh: Standard Denavit-Hartenberg table (theta, d, a, alpha), (n, 4), or None.
+        dh_frames: Names of the frames of that table.
+        spots_path: File of the distance sensors, or None where there is none.
+        model: The pinocchio model.
+    """
+
+    def __init__(self, spec: RobotSpec, model: Any) -> None:
+        self.name = spec.name
+        self.title = spec.title
+        self.manufacturer = spec.manufacturer
+        self.folder: Path = spec.folder
+        self.model_path: Path = spec.model_path
+        self.spots_path: Path | None = spec.spots_path
+        self.model = model
+        self.nq: int = model.nq
+        self.joint_names = spec.joint_names
+        self.lower = _read_only(spec.lower)
+        self.upper = _read_only(spec.upper)
+        self.max_velocity = _read_only(spec.max_velocity)
+        self.max_acceleration = _read_only(spec.max_acceleration)
+        self.home = _read_only(spec.home)
+        self.tool: Tool | None = spec.tool
+        self.dh = None if spec.dh is None else _read_only(spec.dh)
+        self.dh_frames = spec.dh_frames
+        self.frame_names = tuple(spec.frames)
+        self._frame_ids = {name: int(model.getFrameId(target)) for name, target in spec.frames.items()}
+        self.wire_frames = spec.wire_frames
+        self.wire_end_frames = tuple(dict.fromkeys(name for pair in spec.wire_frames for name in pair))
+        place = {name: index for index, name in enumerate(self.wire_end_frames)}
+        starts = np.array([place[start] for start, _ in spec.wire_frames], dtype=np.intp)
+        stops = np.array([place[stop] for _, stop in spec.wire_frames], dtype=np.intp)
+        self.wire_indices = (starts, stops)
+        self.wire_end_ids = tuple(self._frame_ids[name] for name in self.wire_end_frames)
+        self._pool: list[Any] = []
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
+
+    def at(self, q: ArrayLike) -> RobotState:
+        """Kinematics at configuration q, computed once.
+
+        Args:
+            q: Joint positions, (n,) [rad]. Not checked against the limits: a measured robot may be anywhere.
+
+        Returns:
+            A state of its own; states made later do not change it.
+
+        Raises:
+            ConfigurationError: q has the wrong shape.
+        """
+        return RobotState(self, _read_only(self.joint_vector(q, "q")))
+
+    def pose(self, frame: str, q: ArrayLike) -> NDArray[np.float64]:
+        """Pose of a frame in the world at q, (4, 4) [m]. Raises ConfigurationError on an unknown frame."""
+        return self.at(q).pose(frame)
+
+    def jacobian(self, frame: str, q: ArrayLike) -> NDArray[np.float64]:
+        """Geometric Jacobian of a frame at q, world axes, linear rows first, (6, n).
+
+        Raises:
+            ConfigurationError: Unknown frame, or q of the wrong shape.
+        """
+        return self.at(q).jacobian(frame)
+
+    def wire(self, q: ArrayLike, qd: ArrayLike) -> Wire:
+        """Segments of the wire model and the velocities of their ends, eq. (4), each (links, 3) [m, m/s]."""
+        return self.at(q).wire(qd)
+
+    def frame_id(self, frame: str) -> int:
+        """pinocchio's index of a frame.
+
+        Raises:
+            ConfigurationError: There is no such frame; the message lists those there are.
+        """
+        try:
+            return self._frame_ids[frame]
+        except (KeyError, TypeError):
+            expected = "one of " + ", ".join(self.frame_names)
+            raise ConfigurationError(f"robot {self.name}", "frame", frame, expected) from None
+
+    def joint_vector(self, values: ArrayLike, key: str) -> NDArray[np.float64]:
+        """A float64 array of one value a joint, (n,).
+
+        Raises:
+            ConfigurationError: The shape is another one, or these are no numbers.
+        """
+        try:
+            array = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            array = None
+        if array is None or array.shape != (self.nq,):
+            raise ConfigurationError(f"robot {self.name}", key, values, f"{self.nq} numbers, one a joint")
+        return array
+
+    def _borrow(self) -> Any:
+        """A pinocchio work space that no live state uses."""
+        try:
+            return self._pool.pop()
+        except IndexError:
+            return pin.Data(self.model)
+
+    def _give_back(self, data: Any) -> None:
+        self._pool.append(data)
+
+
+def _read_only(values: ArrayLike) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array

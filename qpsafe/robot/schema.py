@@ -1,0 +1,196 @@
+"""What a `robot.toml` may say, and how what it says becomes SI units.
+
+The file is checked in two steps: the shape and type of every value (pydantic, [`RobotFile`][]), then what the values say
+about each other ([`check`][]). Whatever is wrong becomes a [`RobotFileError`][qpsafe.errors.RobotFileError] that names
+the file, the key and the value.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pydantic
+
+from qpsafe.errors import RobotFileError
+
+Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
+Name = Annotated[str, pydantic.Field(strict=True, min_length=1)]
+
+
+class _Table(pydantic.BaseModel):
+    """A TOML table in which an unknown key is an error."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+class Units(_Table):
+    """Units of the figures in the file; they must be stated, none has a default."""
+
+    length: Literal["m", "mm"]
+    angle: Literal["rad", "deg"]
+    mass: Literal["kg"]
+    time: Literal["s"]
+
+    @property
+    def metres(self) -> float:
+        """Metres in one unit of length."""
+        return {"m": 1.0, "mm": 1e-3}[self.length]
+
+    @property
+    def radians(self) -> float:
+        """Radians in one unit of angle."""
+        return {"rad": 1.0, "deg": math.pi / 180.0}[self.angle]
+
+
+class JointLimits(_Table):
+    """Limits of one revolute joint: angle, angle per time, angle per time squared."""
+
+    lower: Number
+    upper: Number
+    max_velocity: Positive
+    max_acceleration: Positive
+
+
+class DHRow(_Table):
+    """One row of a standard Denavit-Hartenberg table: T = Rz(q + theta) Tz(d) Tx(a) Rx(alpha)."""
+
+    theta: Number
+    d: Number
+    a: Number
+    alpha: Number
+
+
+class DenavitHartenberg(_Table):
+    """The table, one row a joint, and the frames it leads to, one more than rows."""
+
+    frames: list[Name]
+    rows: list[DHRow]
+
+
+class WireTable(_Table):
+    """Segments of the wire model as pairs of frame names."""
+
+    links: Annotated[
+        list[Annotated[list[Name], pydantic.Field(min_length=2, max_length=2)]], pydantic.Field(min_length=1)
+    ]
+
+
+class ToolTable(_Table):
+    """The mounted tool: its tip's frame, the frame it is mounted on, the tip's place in that frame, its mass."""
+
+    frame: Name
+    mounted_on: Name
+    offset: Annotated[list[Number], pydantic.Field(min_length=3, max_length=3)]
+    mass: Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, ge=0)]
+
+
+class RobotFile(_Table):
+    """A whole `robot.toml`, in the units of the file."""
+
+    name: Name
+    title: Name
+    manufacturer: str = ""
+    model: Name
+    spots: Name | None = None
+    home: list[Number]
+    units: Units
+    joints: Annotated[dict[str, JointLimits], pydantic.Field(min_length=1)]
+    denavit_hartenberg: DenavitHartenberg | None = None
+    frames: Annotated[dict[str, Name], pydantic.Field(min_length=1)]
+    wire: WireTable
+    tool: ToolTable | None = None
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """Read and check one `robot.toml`.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its values, in its own units, consistent with each other.
+
+    Raises:
+        RobotFileError: The file is missing, is no TOML, or a value in it is wrong.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotFileError(path, "file", path.name, f"a readable UTF-8 file ({error})") from error
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(path, text, error) from error
+    try:
+        file = RobotFile.model_validate(raw)
+    except pydantic.ValidationError as error:
+        raise _named_error(path, error) from error
+    check(path, file)
+    return file
+
+
+def check(path: Path, file: RobotFile) -> None:
+    """Check what the values of one file say about each other.
+
+    Raises:
+        RobotFileError: Limits in the wrong order, a home outside them, a table of the wrong length, an unknown frame.
+    """
+    for name, joint in file.joints.items():
+        if not joint.lower < joint.upper:
+            expected = f"less than upper = {joint.upper!r} {file.units.angle}"
+            raise RobotFileError(path, f"joints.{name}.lower", joint.lower, expected)
+    if len(file.home) != len(file.joints):
+        raise RobotFileError(path, "home", file.home, f"{len(file.joints)} values, one a joint")
+    for i, (value, (name, joint)) in enumerate(zip(file.home, file.joints.items(), strict=True)):
+        if not joint.lower <= value <= joint.upper:
+            expected = f"within the limits of {name}, {joint.lower!r} to {joint.upper!r} {file.units.angle}"
+            raise RobotFileError(path, f"home[{i}]", value, expected)
+    for i, link in enumerate(file.wire.links):
+        _known_frames(path, f"wire.links[{i}]", link, file.frames)
+    if file.tool is not None:
+        _known_frames(path, "tool.frame", [file.tool.frame], file.frames)
+        _known_frames(path, "tool.mounted_on", [file.tool.mounted_on], file.frames)
+    if file.denavit_hartenberg is not None:
+        table = file.denavit_hartenberg
+        if len(table.rows) != len(file.joints):
+            expected = f"{len(file.joints)} rows, one a joint"
+            raise RobotFileError(path, "denavit_hartenberg.rows", f"{len(table.rows)} rows", expected)
+        if len(table.frames) != len(table.rows) + 1:
+            expected = f"{len(table.rows) + 1} frames: the base's and one a joint"
+            raise RobotFileError(path, "denavit_hartenberg.frames", table.frames, expected)
+        _known_frames(path, "denavit_hartenberg.frames", table.frames, file.frames)
+
+
+def _known_frames(path: Path, key: str, names: list[str], frames: dict[str, str]) -> None:
+    for name in names:
+        if name not in frames:
+            raise RobotFileError(path, key, name, "a frame of the table [frames]: " + ", ".join(frames))
+
+
+def _syntax_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> RobotFileError:
+    """Point at the line of the file that is no TOML."""
+    place = re.search(r"line (\d+)", str(error))
+    lines = text.splitlines()
+    number = int(place.group(1)) if place else len(lines)
+    line = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    return RobotFileError(path, f"line {number}", line, f"valid TOML ({error})")
+
+
+def _named_error(path: Path, error: pydantic.ValidationError) -> RobotFileError:
+    """The first complaint of pydantic, as file, key, value and what was expected."""
+    first = error.errors()[0]
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+    value: Any = first["input"]
+    expected = first["msg"]
+    if first["type"] == "missing":
+        value, expected = None, "a value: this key is missing"
+    elif first["type"] == "extra_forbidden":
+        expected = "no such key (misspelt, or in the wrong table?)"
+    elif first["type"] == "literal_error":
+        expected = first["ctx"]["expected"]
+    return RobotFileError(path, key, value, expected)
