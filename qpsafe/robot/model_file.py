@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +46,8 @@ def spec_from_model(path: Path, model: Any, given: dict[str, ArrayLike]) -> Robo
     """Describe a robot from its model file alone.
 
     Frames are all frames of the model. The wire runs from the base through the joints' origins to the model's last
-    frame. What the file does not state must be `given`, except accelerations (10 rad/s^2) and the home pose (zero, moved
-    inside the limits).
+    frame. What the file does not state must be `given`, except accelerations (10 rad/s^2) and the home pose (zero,
+    moved inside the limits).
 
     Args:
         path: The model file.
@@ -92,7 +93,7 @@ def spec_from_model(path: Path, model: Any, given: dict[str, ArrayLike]) -> Robo
         joint_names=names,
         home=home,
         frames={name: name for name in frames},
-        wire_frames=tuple(zip(chain[:-1], chain[1:], strict=True)),
+        wire_frames=tuple(pairwise(chain)),
         **values,
     )
 

@@ -18,7 +18,8 @@ from qpsafe.robot.wire import Wire
 class Robot:
     """Kinematics and limits of one robot; SI units, world frame = the model's world.
 
-    Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick and ask the state.
+    Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick
+    and ask the state.
 
     Attributes:
         name: Short name.
@@ -35,8 +36,9 @@ class Robot:
         frame_names: Names that `pose` and `jacobian` accept.
         wire_frames: Start and end frame of each segment of the wire model.
         wire_end_frames: The different frames in `wire_frames`, base to tip.
-        wire_indices: Places of the start and of the end frames of the segments in `wire_end_frames`, two (links,) arrays.
+        wire_indices: Places of the segments' start and end frames in `wire_end_frames`, two (links,) arrays.
         wire_end_ids: pinocchio's indices of `wire_end_frames`.
+        wire_support: 1 where a joint moves a frame of `wire_end_frames`, else 0, (k, 1, n).
         tool: The mounted tool, or None.
         dh: Standard Denavit-Hartenberg table (theta, d, a, alpha), (n, 4), or None.
         dh_frames: Names of the frames of that table.
@@ -71,6 +73,10 @@ class Robot:
         stops = np.array([place[stop] for _, stop in spec.wire_frames], dtype=np.intp)
         self.wire_indices = (starts, stops)
         self.wire_end_ids = tuple(self._frame_ids[name] for name in self.wire_end_frames)
+        self.wire_support = np.zeros((len(self.wire_end_ids), 1, self.nq))
+        for row, index in enumerate(self.wire_end_ids):
+            for joint in list(model.supports[model.frames[index].parentJoint])[1:]:  # 0 is the universe
+                self.wire_support[row, 0, joint - 1] = 1.0
         self._pool: list[Any] = []
 
     def __repr__(self) -> str:

@@ -1,8 +1,8 @@
 """What a `robot.toml` may say, and how what it says becomes SI units.
 
-The file is checked in two steps: the shape and type of every value (pydantic, [`RobotFile`][]), then what the values say
-about each other ([`check`][]). Whatever is wrong becomes a [`RobotFileError`][qpsafe.errors.RobotFileError] that names
-the file, the key and the value.
+The file is checked in two steps: the shape and type of every value (pydantic, [`RobotFile`][]), then what the values
+say about each other ([`check`][]). Whatever is wrong becomes a [`RobotFileError`][qpsafe.errors.RobotFileError] that
+names the file, the key and the value.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from qpsafe.errors import RobotFileError
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
 Name = Annotated[str, pydantic.Field(strict=True, min_length=1)]
+Pair = Annotated[list[Name], pydantic.Field(min_length=2, max_length=2)]
 
 
 class _Table(pydantic.BaseModel):

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 
+# p @ _SKEW is the matrix of p x, row by row
+_SKEW = np.zeros((3, 9))
+_SKEW[0, [5, 7]] = -1.0, 1.0
+_SKEW[1, [2, 6]] = 1.0, -1.0
+_SKEW[2, [1, 3]] = -1.0, 1.0
+
+
 class RobotState:
     """Kinematics of a robot at one configuration; made by [`Robot.at`][qpsafe.robot.robot.Robot.at].
 
@@ -48,11 +55,11 @@ class RobotState:
 
     def position(self, frame: str) -> NDArray[np.float64]:
         """Origin of a frame in the world, (3,) [m]."""
-        return self._placements[self.robot.frame_id(frame)].translation.copy()
+        return self.pose(frame)[:3, 3]
 
     def rotation(self, frame: str) -> NDArray[np.float64]:
         """Axes of a frame in the world, in columns, (3, 3)."""
-        return self._placements[self.robot.frame_id(frame)].rotation.copy()
+        return self.pose(frame)[:3, :3]
 
     def jacobian(self, frame: str) -> NDArray[np.float64]:
         """Geometric Jacobian of a frame, world axes, three linear rows before three angular ones, (6, n)."""
@@ -80,20 +87,18 @@ class RobotState:
     def wire_jacobians(self) -> NDArray[np.float64]:
         """Linear Jacobians of the frames that end segments of the wire, (k, 3, n), as in `robot.wire_end_frames`.
 
-        Eq. (14) needs them at both ends of each link: rows ``robot.wire_indices[0]`` and ``[1]`` of this array. Computed
-        once a state and read-only.
+        Eq. (14) needs them at both ends of each link: rows ``robot.wire_indices[0]`` and ``[1]`` of this array.
+        Computed once a state and read-only.
         """
         if self._jacobians is None:
-            model, data = self.robot.model, self._data
-            ids = self.robot.wire_end_ids
-            jacobians = np.empty((len(ids), 3, self.robot.nq))
-            for row, index in enumerate(ids):
-                jacobians[row] = pin.getFrameJacobian(model, data, index, pin.LOCAL_WORLD_ALIGNED)[:3]
+            linear, angular = self._data.J[:3], self._data.J[3:]  # joint axes' twists at the world's origin
+            skew = (self._wire_ends() @ _SKEW).reshape(-1, 3, 3)  # p x
+            jacobians = (linear - skew @ angular) * self.robot.wire_support  # v(p) = v(0) - p x omega
             jacobians.flags.writeable = False
             self._jacobians = jacobians
         return self._jacobians
 
     def _wire_ends(self) -> NDArray[np.float64]:
         if self._ends is None:
-            self._ends = np.array([self._placements[index].translation for index in self.robot.wire_end_ids])
+            self._ends = np.array([self._placements[index].homogeneous[:3, 3] for index in self.robot.wire_end_ids])
         return self._ends
