@@ -94,7 +94,10 @@ def spec_from_model(path: Path, model: Any, given: dict[str, ArrayLike]) -> Robo
         home=home,
         frames={name: name for name in frames},
         wire_frames=tuple(pairwise(chain)),
-        **values,
+        lower=values["lower"],
+        upper=values["upper"],
+        max_velocity=values["max_velocity"],
+        max_acceleration=values["max_acceleration"],
     )
 
 

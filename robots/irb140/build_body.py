@@ -5,7 +5,7 @@ and nothing else; with ``--check`` it only says whether they are up to date (exi
 
 Everything is made here from a few dozen figures, chosen by us so that each link's outer extents at the zero pose are
 those of the real arm within 10 mm (a test measures them). No public mesh was used. Figures below are metres in the BASE
-frame with all joints at zero, where every link's frame is parallel to the base's; `Part.xml` subtracts the link's origin.
+frame with all joints at zero, where every link's frame is parallel to the base's; `Part.asset` subtracts the origin.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 XML = Path(__file__).resolve().parent / "robot.xml"
-SEGMENTS = 32  # points on a full circle, half as many on small ones; a multiple of 4, so that circles reach their radius along the axes
+# Points on a full circle, half as many on small ones; a multiple of 8, so that circles reach their radius on the axes.
+SEGMENTS = 32
 
 # Origins of the bodies at the zero pose; must agree with robot.xml (a test compares).
 ORIGIN = {
@@ -216,7 +217,7 @@ def parts() -> list[Part]:
     add(
         "link_2", "arm_high", slab(-0.1705, -0.0685, [(0.048, 0.52, 0.075), (0.07, 0.712, 0.085)], 0.014), collides=True
     )
-    add("link_2", "hub", drum("y", (0.07, 0.352), -0.08, 0.098, 0.060))
+    add("link_2", "hub", drum("y", (0.07, 0.352), -0.08, 0.098, 0.060), collides=True)
     add("link_2", "cover_low", drum("y", (0.07, 0.352), -0.176, -0.16, 0.046, 0.003), "graphite")
     add("link_2", "cover_high", drum("y", (0.07, 0.712), -0.176, -0.16, 0.062, 0.003), "graphite")
 
@@ -225,7 +226,7 @@ def parts() -> list[Part]:
     add(
         "link_3",
         "elbow",
-        np.vstack([elbow, block((-0.062, 0.0), (-0.052, 0.074), (0.642, 0.782), 0.014)]),
+        np.vstack([elbow, block((-0.070, 0.0), (-0.052, 0.074), (0.642, 0.782), 0.014)]),
         collides=True,
     )
     for i, (cy, cz) in enumerate([(-0.016, 0.745), (0.040, 0.745), (0.012, 0.680)]):

@@ -31,8 +31,9 @@ def scene(width: int, height: int) -> mujoco.MjModel:
         <material name="floor" rgba="1 1 1 1" emission="0.38" specular="0" shininess="0"/>
       </asset>
       <worldbody>
-        <light type="spot" pos="0.9 -1.7 3.0" dir="-0.28 0.55 -0.85" diffuse="0.7 0.7 0.7" cutoff="89" exponent="0"/>
-        <light type="spot" pos="-1.2 1.8 2.2" dir="0.4 -0.65 -0.65" diffuse="0.25 0.25 0.25" cutoff="89" exponent="0" castshadow="false"/>
+        <light type="spot" cutoff="89" exponent="0" pos="0.9 -1.7 3.0" dir="-0.28 0.55 -0.85" diffuse="0.7 0.7 0.7"/>
+        <light type="spot" cutoff="89" exponent="0" pos="-1.2 1.8 2.2" dir="0.4 -0.65 -0.65" diffuse="0.25 0.25 0.25"
+               castshadow="false"/>
         <geom type="plane" size="20 20 0.1" material="floor"/>
       </worldbody>
     </mujoco>""")

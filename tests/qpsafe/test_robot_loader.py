@@ -1,0 +1,139 @@
+"""`load_robot`: by name, folder, MJCF or URDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from qpsafe.errors import RobotFileError
+from qpsafe.robot.loader import bundled_robots, load_robot
+
+IRB140 = load_robot("irb140")
+
+URDF = """
+<robot name="planar">
+  <link name="base"/>
+  {links}
+  <joint name="shoulder" type="{kind}">
+    <parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="2" velocity="3" effort="4"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="fore"/><origin xyz="0.5 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="0.5" upper="2" velocity="{velocity}" effort="4"/>
+  </joint>
+  <joint name="mount" type="fixed"><parent link="fore"/><child link="tip"/><origin xyz="0.25 0 0"/></joint>
+</robot>
+"""
+INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+LINKS = "".join(f'<link name="{name}">{INERTIA}</link>' for name in ("upper", "fore", "tip"))
+
+
+def urdf(folder: Path, kind: str = "revolute", velocity: str = "3") -> Path:
+    path = folder / "planar.urdf"
+    path.write_text(URDF.format(links=LINKS, kind=kind, velocity=velocity), encoding="utf-8")
+    return path
+
+
+def test_bundled_robots_all_load() -> None:
+    assert "irb140" in bundled_robots()
+    for name in bundled_robots():
+        assert load_robot(name).name == name
+
+
+def test_an_unknown_name_lists_the_bundled_ones() -> None:
+    with pytest.raises(RobotFileError) as caught:
+        load_robot("irb6700")
+    assert "irb6700" in str(caught.value)
+    assert all(name in str(caught.value) for name in bundled_robots())
+
+
+def test_name_folder_and_file_are_the_same_robot() -> None:
+    for path in (IRB140.folder, str(IRB140.folder), IRB140.folder / "robot.toml"):
+        robot = load_robot(path)
+        assert (robot.name, robot.frame_names, robot.model_path) == ("irb140", IRB140.frame_names, IRB140.model_path)
+
+
+def test_a_folder_s_limits_are_not_overridden_silently() -> None:
+    with pytest.raises(RobotFileError, match="max_velocity"):
+        load_robot("irb140", max_velocity=1.0)
+
+
+def test_a_bare_mjcf_needs_speeds_and_says_so() -> None:
+    with pytest.raises(RobotFileError, match=r"joint_1\.max_velocity.*pass max_velocity="):
+        load_robot(IRB140.model_path)
+
+
+def test_a_bare_mjcf_has_the_same_kinematics_as_its_folder() -> None:
+    robot = load_robot(IRB140.model_path, max_velocity=[1, 2, 3, 4, 5, 6], max_acceleration=7.0, home=IRB140.home)
+    np.testing.assert_array_equal(robot.max_velocity, [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(robot.max_acceleration, 7.0)
+    np.testing.assert_allclose(robot.lower, IRB140.lower, rtol=1e-15)
+    np.testing.assert_allclose(robot.upper, IRB140.upper, rtol=1e-15)
+    np.testing.assert_array_equal(robot.pose("tcp", IRB140.home), IRB140.pose("tcp", IRB140.home))
+    wire = robot.wire(IRB140.home, np.zeros(6))
+    np.testing.assert_allclose(wire.ends[-1], IRB140.pose("tcp", IRB140.home)[:3, 3], atol=1e-15)
+    np.testing.assert_array_equal(wire.starts[1:], wire.ends[:-1])  # one chain from the base to the tip
+
+
+def test_a_urdf_against_plane_trigonometry(tmp_path: Path) -> None:
+    robot = load_robot(urdf(tmp_path))
+    assert robot.joint_names == ("shoulder", "elbow")
+    np.testing.assert_array_equal(robot.lower, [-1, 0.5])
+    np.testing.assert_array_equal(robot.max_velocity, [3, 3])
+    np.testing.assert_array_equal(robot.max_acceleration, 10.0)
+    np.testing.assert_array_equal(robot.home, [0, 0.5])  # zero, moved inside the limits
+    a, b = 0.3, 0.9
+    tip = [0.5 * np.cos(a) + 0.25 * np.cos(a + b), 0.5 * np.sin(a) + 0.25 * np.sin(a + b), 0.0]
+    np.testing.assert_allclose(robot.pose("tip", [a, b])[:3, 3], tip, rtol=0, atol=1e-15)
+    wire = robot.wire([a, b], [1.0, 0.0])
+    np.testing.assert_allclose(wire.ends[-1], tip, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(wire.end_velocities[-1], [-tip[1], tip[0], 0.0], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("keyword", "value", "key"),
+    [
+        ("lower", 3.0, "shoulder.lower"),
+        ("upper", [2.0, np.nan], "elbow.upper"),
+        ("max_velocity", -1.0, "shoulder.max_velocity"),
+        ("max_velocity", [1.0, 2.0, 3.0], "max_velocity"),
+        ("max_velocity", "fast", "max_velocity"),
+        ("max_acceleration", [1.0, 0.0], "elbow.max_acceleration"),
+        ("max_acceleration", np.inf, "shoulder.max_acceleration"),
+        ("home", [0.0, 0.0], "elbow.home"),
+        ("home", [np.nan, 1.0], "shoulder.home"),
+    ],
+)
+def test_wrong_overrides_are_named(tmp_path: Path, keyword: str, value: object, key: str) -> None:
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(urdf(tmp_path), **{keyword: value})
+    assert caught.value.key == key
+
+
+@pytest.mark.parametrize("kind", ["prismatic", "continuous"])
+def test_joints_that_cannot_be_handled_are_named(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(RobotFileError, match=r"shoulder.*revolute"):
+        load_robot(urdf(tmp_path, kind=kind))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "MJCF or URDF"),
+        ("<mujoco>", "MJCF or URDF"),
+        ("<sdf/>", "<mujoco>"),
+        ("<mujoco/>", ""),
+        ("<robot name='r'><link name='a'/></robot>", "joint"),
+        ("\x00\x01", "MJCF or URDF"),
+    ],
+)
+def test_files_that_are_no_robot_are_errors(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "some.xml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(path)
+    assert caught.value.where == str(path)
+    assert expected in caught.value.expected
