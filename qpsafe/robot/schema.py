@@ -187,7 +187,7 @@ def _named_error(path: Path, error: pydantic.ValidationError) -> RobotFileError:
     first = error.errors()[0]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
     value: Any = first["input"]
-    expected = first["msg"]
+    expected = first["msg"].removeprefix("Input should be ")
     if first["type"] == "missing":
         value, expected = None, "a value: this key is missing"
     elif first["type"] == "extra_forbidden":
