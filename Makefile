@@ -1,0 +1,44 @@
+# Every target sets up what it needs in ./.venv: nothing global, only Python (3.11 to 3.14) and make are required.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+OUT    ?= out/demo-fixed
+
+.PHONY: demo test test-slow dev lint bench clean
+
+demo: $(VENV)/.demo ## the source's first experiment: table, figure, csv, video
+	$(BIN)/qpsafe demo fixed --out $(OUT)
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+test-slow: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2
+
+dev: $(VENV)/.dev ## everything for working on the project, and links that static checkers follow
+	ln -sfn ../tasks qpsafe/tasks
+	ln -sfn ../robots qpsafe/robots
+	ln -sfn ../sim qpsafe/sim
+	@echo "ready: $(BIN)/qpsafe --help"
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+bench: $(VENV)/.demo
+	$(BIN)/qpsafe bench --json bench.json
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; ok = (3, 11) <= sys.version_info[:2] <= (3, 14); sys.exit(0 if ok else "qpsafe needs Python 3.11 to 3.14, found " + sys.version.split()[0] + "; try: make PYTHON=python3.12")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.demo: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[video]'
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@ $(VENV)/.demo
+
+clean:
+	rm -rf $(VENV) out build *.egg-info bench.json

@@ -1,0 +1,83 @@
+"""qpsafe: danger-aware hierarchical QP control for industrial robot arms that share their space with people.
+
+Names are imported when first used, so that `import qpsafe` stays quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+#: Public name -> module that defines it.
+_PUBLIC = {
+    "Activation": "qpsafe.danger.activation",
+    "ConfigurationError": "qpsafe.errors",
+    "DangerField": "qpsafe.danger.field",
+    "Evasion": "qpsafe.danger.evasion",
+    "FixedPose": "qpsafe.tasks.trajectory",
+    "HierarchicalLaw": "qpsafe.laws.hierarchical",
+    "JointLimits": "qpsafe.limits",
+    "JointReference": "qpsafe.reference",
+    "Level": "qpsafe.hqp.level",
+    "NullspaceLaw": "qpsafe.laws.nullspace",
+    "OrientationTask": "qpsafe.tasks.orientation",
+    "PositionTask": "qpsafe.tasks.position",
+    "QpsafeError": "qpsafe.errors",
+    "RobotFileError": "qpsafe.errors",
+    "SafetyController": "qpsafe.controller",
+    "SpotArray": "qpsafe.sensing.spots",
+    "Threshold": "qpsafe.danger.activation",
+    "Tick": "qpsafe.tick",
+    "WeightedLaw": "qpsafe.laws.weighted",
+    "Wire": "qpsafe.robot.wire",
+    "bundled_robots": "qpsafe.robot.loader",
+    "load_robot": "qpsafe.robot.loader",
+    "load_spots": "qpsafe.sensing.spots",
+    "nullspace_velocity": "qpsafe.laws.nullspace",
+    "solve_hierarchy": "qpsafe.hqp.solve",
+}
+
+__all__ = ["__version__", *sorted(_PUBLIC)]
+
+if TYPE_CHECKING:
+    from qpsafe.controller import SafetyController as SafetyController
+    from qpsafe.danger.activation import Activation as Activation
+    from qpsafe.danger.activation import Threshold as Threshold
+    from qpsafe.danger.evasion import Evasion as Evasion
+    from qpsafe.danger.field import DangerField as DangerField
+    from qpsafe.errors import ConfigurationError as ConfigurationError
+    from qpsafe.errors import QpsafeError as QpsafeError
+    from qpsafe.errors import RobotFileError as RobotFileError
+    from qpsafe.hqp.level import Level as Level
+    from qpsafe.hqp.solve import solve_hierarchy as solve_hierarchy
+    from qpsafe.laws.hierarchical import HierarchicalLaw as HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw as NullspaceLaw
+    from qpsafe.laws.nullspace import nullspace_velocity as nullspace_velocity
+    from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
+    from qpsafe.limits import JointLimits as JointLimits
+    from qpsafe.reference import JointReference as JointReference
+    from qpsafe.robot.loader import bundled_robots as bundled_robots
+    from qpsafe.robot.loader import load_robot as load_robot
+    from qpsafe.robot.wire import Wire as Wire
+    from qpsafe.sensing.spots import SpotArray as SpotArray
+    from qpsafe.sensing.spots import load_spots as load_spots
+    from qpsafe.tasks.orientation import OrientationTask as OrientationTask
+    from qpsafe.tasks.position import PositionTask as PositionTask
+    from qpsafe.tasks.trajectory import FixedPose as FixedPose
+    from qpsafe.tick import Tick as Tick
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module on first use."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'qpsafe' has no attribute {name!r}")
+    value = getattr(import_module(_PUBLIC[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Public names, imported or not."""
+    return sorted({*globals(), *_PUBLIC})

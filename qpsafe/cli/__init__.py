@@ -1,0 +1,1 @@
+"""Command line of qpsafe: one file a command."""

@@ -1,0 +1,1 @@
+"""The danger field, the evasive motion it causes and the activations it switches."""

@@ -1,0 +1,131 @@
+"""When tasks are released: the smooth activations m and f, eqs. (19) and (21), and the regimes of Table I.
+
+Every task has one threshold. With the danger rising, the task of lowest priority is released first. For two tasks the
+source's parameters are a_1 = m and a_2 = m f, and the regimes are its low, medium and high danger.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """One smooth switch, eq. (19) or (21): 1 below Δ(1-ε), 0 above Δ(1+ε), a half sine wave between.
+
+    Attributes:
+        delta: Δ, the danger at which the switch stands at 1/2 (same unit as the field, 1/m for a robot at rest).
+        epsilon: ε in (0, 1), half the width of the transition relative to Δ.
+    """
+
+    delta: float
+    epsilon: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.delta) and self.delta > 0.0):
+            raise ConfigurationError("Threshold", "delta", self.delta, "a finite number > 0")
+        if not (0.0 < self.epsilon < 1.0):
+            raise ConfigurationError("Threshold", "epsilon", self.epsilon, "a number strictly between 0 and 1")
+
+    @property
+    def start(self) -> float:
+        """Δ(1-ε): the release begins above it."""
+        return self.delta * (1.0 - self.epsilon)
+
+    @property
+    def end(self) -> float:
+        """Δ(1+ε): the release is complete from here on."""
+        return self.delta * (1.0 + self.epsilon)
+
+    def __call__(self, danger: float) -> float:
+        """Evaluate the switch; anything that is not a number counts as full danger and gives 0."""
+        if danger <= self.start:
+            return 1.0
+        if danger < self.end:
+            # (19), (21)
+            return 0.5 - 0.5 * math.sin(math.pi * (danger - self.delta) / (2.0 * self.epsilon * self.delta))
+        return 0.0
+
+
+#: Names of the regimes by the number of tasks that are kept, for one and for two tasks (Table I).
+REGIME_NAMES = {1: ("high", "low"), 2: ("high", "medium", "low")}
+
+
+class Activation:
+    """Activations 1 >= a_1 >= ... >= a_N >= 0 of N tasks, highest priority first, from the danger CDF_n.
+
+    Args:
+        thresholds: One per task, highest priority first. Defaults to the source's values for two tasks:
+            Δ = 11.5, ε = 0.15 for the high-priority task (m) and Δ_f = 7.5, ε_f = 0.25 for the low one (f).
+
+    Raises:
+        ConfigurationError: A task would begin its release before one of lower priority is released completely,
+            Δ_f (1+ε_f) > Δ (1-ε): Table I's impossible situation m = 0, f = 1 must not come near.
+    """
+
+    def __init__(self, thresholds: tuple[Threshold, ...] = (Threshold(11.5, 0.15), Threshold(7.5, 0.25))) -> None:
+        self.thresholds = tuple(thresholds)
+        if not self.thresholds:
+            raise ConfigurationError("Activation", "thresholds", thresholds, "at least one Threshold")
+        for k in range(len(self.thresholds) - 1):
+            upper, lower = self.thresholds[k], self.thresholds[k + 1]
+            if lower.end > upper.start:
+                raise ConfigurationError(
+                    "Activation",
+                    f"thresholds[{k + 1}]",
+                    lower,
+                    f"Δ(1+ε) <= {upper.start:g}, where the release of the task above it begins (found {lower.end:g})",
+                )
+
+    @property
+    def suspend_above(self) -> float:
+        """Δ(1-ε) of the task of highest priority: beyond it the path is suspended (section IV-C)."""
+        return self.thresholds[0].start
+
+    def switches(self, cdf_n: float) -> tuple[float, ...]:
+        """The switches (m, f, ...) of eqs. (19), (21), one per task, each in [0, 1]."""
+        return tuple(threshold(cdf_n) for threshold in self.thresholds)
+
+    def activations(self, cdf_n: float) -> tuple[float, ...]:
+        """Activations a_k = product of the first k switches: (m, m f, ...)."""
+        result: list[float] = []
+        product = 1.0
+        for switch in self.switches(cdf_n):
+            product *= switch
+            result.append(product)
+        return tuple(result)
+
+    def kept(self, cdf_n: float) -> int:
+        """Number of tasks not yet being released: N in low danger, 0 in high danger."""
+        return sum(1 for threshold in self.thresholds if cdf_n <= threshold.start)
+
+    def regime(self, cdf_n: float) -> str:
+        """Name of the danger level (Table I): ``low``, ``medium`` or ``high``.
+
+        A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two tasks
+        the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
+        """
+        n, kept = len(self.thresholds), self.kept(cdf_n)
+        if n in REGIME_NAMES:
+            return REGIME_NAMES[n][kept]
+        return "high" if kept == 0 else "low" if kept == n else f"medium-{kept}"
+
+
+def regime_weights(activations: tuple[float, ...]) -> NDArray[np.float64]:
+    """Weights of the N+1 regimes in the blend of math section 1: w_k = a_k - a_(k+1), with a_0 = 1, a_(N+1) = 0.
+
+    Args:
+        activations: 1 >= a_1 >= ... >= a_N >= 0.
+
+    Returns:
+        (N+1,), >= 0, summing to 1. Entry k weighs the regime that keeps tasks 1..k; for two tasks that is
+        (1-m, m(1-f), m f): high, medium, low danger.
+    """
+    a = np.array((1.0, *activations, 0.0))
+    return a[:-1] - a[1:]

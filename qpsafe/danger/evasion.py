@@ -1,0 +1,99 @@
+"""Evasive motion, eqs. (8), (14)-(16): danger vectors as virtual forces on the links, through an admittance filter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
+
+
+def link_vectors(vectors: NDArray[np.float64], links: NDArray[np.int64], n_links: int) -> NDArray[np.float64]:
+    """Sum the danger vectors of each link's points, eq. (8).
+
+    Args:
+        vectors: Danger vectors (6), (p, 3), world frame.
+        links: Wire link that saw each point, (p,), in 0..n_links-1.
+        n_links: Number of wire links.
+
+    Returns:
+        One vector per link, (n_links, 3); zero where the link saw nothing.
+    """
+    total = np.zeros((n_links, 3))
+    np.add.at(total, links, vectors)
+    return total
+
+
+def virtual_torque(state: RobotState, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Virtual joint torque of the link vectors, each applied at both end frames of its link, eqs. (14), (15).
+
+    Only the linear rows of the Jacobians act, since the wrench has no moment. An end frame on the static base has a
+    zero Jacobian and adds nothing.
+
+    Args:
+        state: Robot at the measured joint position.
+        forces: One vector per wire link, (links, 3), world frame.
+
+    Returns:
+        σ, (n,).
+    """
+    starts, stops = state.robot.wire_indices
+    J = state.wire_jacobians()  # linear rows at every end frame
+    # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) superposition: σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
+    return np.einsum("lkn,lk->n", J[starts] + J[stops], forces)
+
+
+class Evasion:
+    """Mass-damper admittance q̇0 = (M s + D)^-1 σ, eq. (16), sampled exactly for a held input.
+
+    Args:
+        mass: M, scalar, (n,) diagonal or (n, n) symmetric positive definite.
+        damping: D, likewise. D sets the steady speed D^-1 σ, D/M how fast it is reached.
+        n: Number of joints.
+        dt: Sample time [s].
+
+    Raises:
+        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, or dt <= 0.
+    """
+
+    def __init__(self, mass: ArrayLike, damping: ArrayLike, n: int, dt: float = 0.004) -> None:
+        from scipy.linalg import expm
+
+        if not (np.isfinite(dt) and dt > 0.0):
+            raise ConfigurationError("Evasion", "dt", dt, "a finite time > 0 [s]")
+        self.mass = _positive_definite(mass, n, "mass")
+        self.damping = _positive_definite(damping, n, "damping")
+        # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
+        self._A = expm(-np.linalg.solve(self.mass, self.damping) * dt)
+        self._B = np.linalg.solve(self.damping.T, (np.eye(n) - self._A).T).T
+        self.velocity = np.zeros(n)
+
+    def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s]."""
+        self.velocity = self._A @ self.velocity + self._B @ sigma
+        return self.velocity
+
+    def reset(self) -> None:
+        """Forget the past: q̇0 = 0."""
+        self.velocity = np.zeros_like(self.velocity)
+
+
+def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:
+    """Scalar, diagonal or full matrix as a checked (n, n) symmetric positive definite array."""
+    expected = f"a positive scalar, ({n},) positive diagonal or ({n}, {n}) symmetric positive definite matrix"
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ConfigurationError("Evasion", key, value, expected) from None
+    if array.ndim < 2 and array.shape in ((), (1,), (n,)):
+        array = np.diag(np.broadcast_to(array, n).astype(float))
+    if array.shape != (n, n) or not np.isfinite(array).all() or not np.allclose(array, array.T):
+        raise ConfigurationError("Evasion", key, value, expected)
+    if np.linalg.eigvalsh(array)[0] <= 0.0:
+        raise ConfigurationError("Evasion", key, value, expected)
+    return array

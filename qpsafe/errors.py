@@ -1,0 +1,38 @@
+"""Named errors for mistakes in a user's configuration.
+
+Data in the control loop never raises: it is reported in the [`Tick`][qpsafe.tick.Tick]. What a person wrote wrongly
+(a robot file, a constructor argument, a command-line value) raises one of these at once, and says which value, where,
+and what was expected.
+"""
+
+from __future__ import annotations
+
+
+class QpsafeError(Exception):
+    """Base class of every error that qpsafe raises on purpose."""
+
+
+class ConfigurationError(QpsafeError, ValueError):
+    """A value that a person configured is wrong.
+
+    Attributes:
+        where: File or object that holds the value, e.g. ``"robots/irb140/robot.toml"``.
+        key: Path of the value inside it, e.g. ``"joints.joint_2.lower"``.
+        value: The value found.
+        expected: What was expected instead, in words with units.
+    """
+
+    def __init__(self, where: object, key: str, value: object, expected: str) -> None:
+        self.where = str(where)
+        self.key = key
+        self.value = value
+        self.expected = expected
+        super().__init__(f"{self.where}: {key} = {value!r}: expected {expected}")
+
+
+class RobotFileError(ConfigurationError):
+    """A robot folder, its `robot.toml`, `spots.toml` or model file is wrong."""
+
+
+class MissingExtraError(QpsafeError, ImportError):
+    """An optional dependency is needed for what was asked; the message names the extra to install."""

@@ -1,0 +1,1 @@
+"""Hierarchical quadratic programmes: prioritised least squares under hard limits."""

@@ -1,0 +1,72 @@
+"""The law as a blend of hierarchical QPs under hard joint limits (math section 1)."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from qpsafe.danger.activation import regime_weights
+from qpsafe.errors import ConfigurationError
+from qpsafe.hqp.level import Level
+from qpsafe.hqp.solution import Solution
+from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.laws.nullspace import paper_regime, pseudoinverse
+from qpsafe.laws.problem import LawProblem, LawResult
+
+Projection = Literal["strict", "paper"]
+
+
+class HierarchicalLaw:
+    """Lexicographic QPs, one per regime of Table I, blended by the activations.
+
+    q̇ = Σ_k w_k q̇_k, with w = `regime_weights` and q̇_k the solution of the hierarchy that keeps tasks 1..k,
+
+        projection="strict":  [J_1 q̇ = ẋ_1 ≻ ... ≻ J_k q̇ = ẋ_k ≻ min ||q̇ - q̇0||²]
+        projection="paper":   [J_1 q̇ = ẋ_1 ≻ min ||q̇ - (Σ_(i>=2) N_(i-1) P(J_i) ẋ_i + N_k q̇0)||²]
+
+    each subject to the same limits, so the blend meets them too and is continuous in the activations. "paper" without
+    active limits equals eqs. (18) and (22). "strict" differs where tasks are not independent of each other: there the
+    error of the lower one still goes to zero whenever it can. Only regimes with weight are solved: one in a pure
+    regime, two in a transition.
+
+    Args:
+        projection: How tasks below the first are treated.
+        solver: Solver of `solve_hierarchy`; None for its default.
+
+    Raises:
+        ConfigurationError: Unknown projection.
+    """
+
+    def __init__(self, projection: Projection = "strict", solver: str | None = None) -> None:
+        if projection not in get_args(Projection):
+            raise ConfigurationError("HierarchicalLaw", "projection", projection, f"one of {get_args(Projection)}")
+        self.projection = projection
+        self.solver = solver
+
+    def solve(self, problem: LawProblem) -> LawResult:
+        """Solve one tick; see `LawProblem` for shapes."""
+        qd = np.zeros(len(problem.qd0))
+        status = "solved"
+        regimes = []
+        for kept, weight in enumerate(regime_weights(problem.activations)):
+            if weight > 0.0:
+                solution = self._solve_regime(problem, kept)
+                qd += weight * solution.qd
+                regimes.append((float(weight), solution))
+                if solution.status != "solved" and status == "solved":
+                    status = solution.status
+        return LawResult(qd, status, tuple(regimes))
+
+    def _solve_regime(self, problem: LawProblem, kept: int) -> Solution:
+        n = len(problem.qd0)
+        identity = np.eye(n)
+        if self.projection == "strict" or kept < 2:
+            levels = [Level(J, xd, xd) for J, xd in problem.tasks[:kept]]
+            levels.append(Level(identity, problem.qd0, problem.qd0))  # E closes every hierarchy
+        else:
+            J_1, xd_1 = problem.tasks[0]
+            # what the source adds below the first task; its part in the range of P(J_1) is overruled by level 1
+            target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
+            levels = [Level(J_1, xd_1, xd_1), Level(identity, target, target)]
+        return solve_hierarchy(levels, problem.lower, problem.upper, solver=self.solver)

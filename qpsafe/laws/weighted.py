@@ -1,0 +1,45 @@
+"""Soft priorities: all objectives in one weighted QP under the same limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.hqp.level import Level
+from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.laws.problem import LawProblem, LawResult
+
+
+class WeightedLaw:
+    """One QP: minimise Σ_k a_k w_k ||J_k q̇ - ẋ_k||² + w_E ||q̇ - q̇0||² within the limits.
+
+    For two tasks: w_H m ||J_H q̇ - ẋ_H||² + w_L m f ||J_L q̇ - ẋ_L||² + w_E ||q̇ - q̇0||². Priorities are soft: a lower
+    objective disturbs a higher one by about the ratio of the weights.
+
+    Args:
+        ratio: Ratio of the weights of neighbouring priorities, w_k / w_(k+1); w_E = 1.
+        solver: Solver of `solve_hierarchy`; None for its default.
+
+    Raises:
+        ConfigurationError: The ratio is not a finite number > 1.
+    """
+
+    def __init__(self, ratio: float = 1e3, solver: str | None = None) -> None:
+        if not (math.isfinite(ratio) and ratio > 1.0):
+            raise ConfigurationError("WeightedLaw", "ratio", ratio, "a finite number > 1")
+        self.ratio = ratio
+        self.solver = solver
+
+    def solve(self, problem: LawProblem) -> LawResult:
+        """Solve one tick; see `LawProblem` for shapes."""
+        n, count = len(problem.qd0), len(problem.tasks)
+        rows, targets = [np.eye(n)], [problem.qd0]
+        for k, ((J, xd), a) in enumerate(zip(problem.tasks, problem.activations, strict=True)):
+            scale = math.sqrt(a * self.ratio ** (count - k))  # ||s (J q̇ - ẋ)||² = s² ||J q̇ - ẋ||²
+            rows.append(scale * J)
+            targets.append(scale * xd)
+        A, b = np.vstack(rows), np.concatenate(targets)
+        solution = solve_hierarchy([Level(A, b, b)], problem.lower, problem.upper, solver=self.solver)
+        return LawResult(solution.qd, solution.status, ((1.0, solution),))

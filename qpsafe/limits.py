@@ -1,0 +1,171 @@
+"""Joint limits that can always be met: one box lower <= q̇ <= upper per tick (math section 4).
+
+The box is the intersection of velocity limits, acceleration limits around the last command, and the largest speeds
+from which braking by at most a dt per tick still stops before the position limits. Whoever stays inside the box finds
+it non-empty at the next tick, so a law that respects it never meets an infeasible problem.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+
+#: Kinds of limits by their code; 0 stands for none.
+KINDS = ("", "position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True)
+class Box:
+    """Admissible joint velocities of one tick.
+
+    Attributes:
+        lower: (n,) [rad/s].
+        upper: (n,) [rad/s], >= lower.
+        lower_kind: Which limit made `lower`, (n,) codes into `KINDS`.
+        upper_kind: Which limit made `upper`, (n,) codes into `KINDS`.
+        sacrificed: Which limit had to give way for the others, (n,) codes into `KINDS`, 0 for none. Position gives way
+            first, then velocity; acceleration always holds.
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    lower_kind: NDArray[np.int64]
+    upper_kind: NDArray[np.int64]
+    sacrificed: NDArray[np.int64]
+
+    def clip(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The nearest velocity inside the box; `qd` must be finite."""
+        return np.minimum(np.maximum(qd, self.lower), self.upper)
+
+    def binding(self, qd: NDArray[np.float64], names: tuple[str, ...], tolerance: float = 1e-9) -> tuple[str, ...]:
+        """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``."""
+        found = []
+        for i, name in enumerate(names):
+            if qd[i] >= self.upper[i] - tolerance:
+                found.append(f"{name}: upper {KINDS[self.upper_kind[i]]}")
+            elif qd[i] <= self.lower[i] + tolerance:
+                found.append(f"{name}: lower {KINDS[self.lower_kind[i]]}")
+        return tuple(found)
+
+    def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """What was sacrificed, in words, one entry per joint concerned."""
+        return tuple(f"{names[i]}: {KINDS[kind]} limit sacrificed" for i, kind in enumerate(self.sacrificed) if kind)
+
+
+class JointLimits:
+    """Position, velocity and acceleration limits of a velocity-controlled robot sampled at `dt`.
+
+    Args:
+        lower: Lowest joint positions (n,) [rad], may be -inf.
+        upper: Highest joint positions (n,) [rad], may be +inf.
+        max_velocity: (n,) [rad/s], > 0.
+        max_acceleration: (n,) [rad/s²], > 0.
+        dt: Sample time [s].
+        return_speed: Speed at which a joint that starts outside its position limits is brought back [rad/s].
+
+    Raises:
+        ConfigurationError: Shapes differ, a number is NaN, lower > upper, or a rate is not positive.
+    """
+
+    def __init__(
+        self,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        max_velocity: ArrayLike,
+        max_acceleration: ArrayLike,
+        dt: float = 0.004,
+        return_speed: float = 0.1,
+    ) -> None:
+        self.lower = np.array(lower, dtype=float)
+        self.upper = np.array(upper, dtype=float)
+        self.max_velocity = np.array(max_velocity, dtype=float)
+        self.max_acceleration = np.array(max_acceleration, dtype=float)
+        self.dt = float(dt)
+        self.return_speed = float(return_speed)
+        shape = self.lower.shape
+        for key in ("upper", "max_velocity", "max_acceleration"):
+            if getattr(self, key).shape != shape:
+                raise ConfigurationError("JointLimits", key, getattr(self, key), f"an array of shape {shape}")
+        if not (self.lower <= self.upper).all():
+            raise ConfigurationError("JointLimits", "lower", self.lower, f"numbers <= upper = {self.upper}")
+        for key in ("max_velocity", "max_acceleration", "dt", "return_speed"):
+            value = np.asarray(getattr(self, key))
+            if not (np.isfinite(value).all() and (value > 0.0).all()):
+                raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
+
+    def box(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:
+        """Admissible velocities for the next tick.
+
+        Args:
+            q: Commanded joint position (n,) [rad], finite.
+            qd: Last commanded joint velocity (n,) [rad/s], finite.
+
+        Returns:
+            A box with lower <= upper, whatever the state.
+        """
+        bounds = np.empty((2, len(q)))
+        kinds = np.zeros((3, len(q)), dtype=np.int64)
+        limits = (self.lower, self.upper, self.max_velocity, self.max_acceleration)
+        _box(q, qd, *limits, self.dt, self.return_speed, bounds, kinds)
+        return Box(bounds[0], bounds[1], kinds[0], kinds[1], kinds[2])
+
+
+@njit("float64(float64, float64, float64)", cache=True)
+def stopping_speed(s: float, a: float, dt: float) -> float:
+    """Largest speed that, reduced by a dt each tick, has stopped after at most the distance s >= 0.
+
+    With n = s/(a dt²) and k = floor((sqrt(1+8n)-1)/2) full decrements: v = a dt (n + k(k+1)/2)/(k+1), since the way
+    covered, dt Σ_{j=0..k} (v - j a dt), must equal s.
+    """
+    n = s / (a * dt * dt)
+    if not n < 1e15:  # infinitely far away
+        return np.inf
+    k = math.floor((math.sqrt(1.0 + 8.0 * n) - 1.0) / 2.0)
+    return a * dt * (n + 0.5 * k * (k + 1.0)) / (k + 1.0)
+
+
+@njit(cache=True)
+def _position_bound(s, a, dt, return_speed):  # type: ignore[no-untyped-def]
+    """Highest speed towards a position limit at distance s; negative, i.e. away from it, where it was passed."""
+    if s >= 0.0:
+        return stopping_speed(s, a, dt)
+    return -min(-s / dt, return_speed)
+
+
+@njit(cache=True)
+def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  # type: ignore[no-untyped-def]
+    """Fill bounds (2, n) with lower and upper speeds, kinds (3, n) with the codes of Box; one joint at a time."""
+    for i in range(len(q)):
+        a = a_max[i]
+        lo, hi = qd[i] - a * dt, qd[i] + a * dt
+        kind_lo, kind_hi, sacrificed = 3, 3, 0
+        if lo > v_max[i]:  # too fast to be under the velocity limit after one tick: brake as hard as allowed
+            hi, sacrificed = lo, 2
+        elif hi < -v_max[i]:
+            lo, sacrificed = hi, 2
+        else:
+            if -v_max[i] > lo:
+                lo, kind_lo = -v_max[i], 2
+            if v_max[i] < hi:
+                hi, kind_hi = v_max[i], 2
+        p_hi = _position_bound(upper[i] - q[i], a, dt, return_speed)
+        p_lo = -_position_bound(q[i] - lower[i], a, dt, return_speed)
+        # where the position bound is out of reach, the nearest speed that is not (1e-9: rounding is no sacrifice)
+        if p_hi < lo - 1e-9 or p_lo > hi + 1e-9:
+            sacrificed = max(sacrificed, 1)
+        old_lo, old_hi = lo, hi
+        if p_hi < hi:
+            hi, kind_hi = max(p_hi, old_lo), 1
+        if p_lo > lo:
+            lo, kind_lo = min(p_lo, old_hi), 1
+        if lo > hi:  # position limits closer together than the robot can obey: the middle
+            lo = hi = 0.5 * (lo + hi)
+            sacrificed = max(sacrificed, 1)
+        bounds[0, i], bounds[1, i] = lo, hi
+        kinds[0, i], kinds[1, i], kinds[2, i] = kind_lo, kind_hi, sacrificed

@@ -1,0 +1,1 @@
+"""Distance sensors on the robot and the points they detect."""

@@ -1,0 +1,115 @@
+"""From raw input of one tick to the points that count, or a plain report of what is wrong with it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
+    from qpsafe.robot.wire import Wire
+    from qpsafe.sensing.hold import PointHold
+    from qpsafe.sensing.spots import SpotArray
+
+
+class BadInput(Exception):
+    """Input of one tick that cannot be used; caught inside `SafetyController.step`, which reports it."""
+
+
+class Detection(NamedTuple):
+    """Points that count in this tick.
+
+    Attributes:
+        points: (p, 3), world frame [m].
+        links: Wire link of each point, (p,), from 0.
+    """
+
+    points: NDArray[np.float64]
+    links: NDArray[np.int64]
+
+
+def as_joint_vector(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
+    """`value` as a finite (n,) array of its own, or BadInput."""
+    array = _as_floats(name, value)
+    if array.shape != (n,):
+        raise BadInput(f"{name} has shape {array.shape}, expected ({n},)")
+    if not np.isfinite(array).all():
+        raise BadInput(f"{name} is not finite: {array}")
+    return array
+
+
+def as_detection(
+    state: RobotState,
+    wire: Wire,
+    spots: SpotArray | None,
+    hold: PointHold,
+    distances: ArrayLike | None,
+    points: ArrayLike | None,
+) -> Detection:
+    """The detected points of one tick.
+
+    Args:
+        state: Robot at the measured joint position.
+        wire: Its wire model.
+        spots: The distance sensors, or None.
+        hold: Memory of points that the spots lost a moment ago.
+        distances: One reading per spot (k,) [m], or points (p, 3), or None.
+        points: Points (p, 3) [m], or None.
+
+    Raises:
+        BadInput: Wrong shape; a distance that is NaN or below zero; a point that is not finite; both or neither kind
+            given as usable input.
+    """
+    if distances is not None and points is not None:
+        raise BadInput("both distances and points are given, expected one of them")
+    if distances is not None:
+        array = _as_floats("distances", distances)
+        if array.ndim == 2 and array.shape[1] == 3:
+            return _from_points(wire, array)
+        return _from_distances(state, spots, hold, array)
+    if points is not None:
+        return _from_points(wire, _as_floats("points", points))
+    return Detection(np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+
+
+def _from_distances(
+    state: RobotState, spots: SpotArray | None, hold: PointHold, distances: NDArray[np.float64]
+) -> Detection:
+    if spots is None:
+        raise BadInput("distances are given but the robot has no spots")
+    if distances.shape != (len(spots),):
+        raise BadInput(f"distances have shape {distances.shape}, expected ({len(spots)},)")
+    if not (distances >= 0.0).all():  # NaN fails the comparison too
+        bad = [f"{spots.names[i]} = {distances[i]:g}" for i in np.flatnonzero(~(distances >= 0.0))]
+        raise BadInput("distances below zero or not a number: " + ", ".join(bad))
+    hit = spots.detected(distances)
+    points = spots.points(state, np.where(hit, distances, 0.0))
+    counts = hold.update(points, hit)
+    return Detection(points[counts], spots.links[counts])
+
+
+def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise BadInput(f"points have shape {points.shape}, expected (p, 3)")
+    if not np.isfinite(points).all():
+        raise BadInput("a point is not finite")
+    return Detection(points, nearest_link(points, wire))
+
+
+def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
+    """Wire link nearest to each point (p, 3): (p,), the first one where several are equally near."""
+    along = wire.ends - wire.starts  # (links, 3)
+    length2 = np.maximum(np.sum(along**2, axis=1), 1e-300)
+    offset = points[:, None, :] - wire.starts  # (p, links, 3)
+    t = np.clip(np.sum(offset * along, axis=2) / length2, 0.0, 1.0)
+    distance2 = np.sum((offset - t[..., None] * along) ** 2, axis=2)
+    return np.argmin(distance2, axis=1)
+
+
+def _as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput(f"{name} is not an array of numbers") from None

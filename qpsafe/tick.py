@@ -1,0 +1,103 @@
+"""One tick that explains itself: what was seen, how dangerous it is, what gave way and what was commanded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.laws.problem import LawResult
+from qpsafe.limits import Box
+from qpsafe.reference import JointReference
+
+#: The tick went as planned.
+OK = "ok"
+#: The law answered, but not as planned (limits sacrificed, a solver failed); `messages` says how.
+DEGRADED = "degraded"
+#: The input could not be used; the robot holds, braking within its limits.
+BAD_INPUT = "bad_input"
+#: Something in the controller failed; the robot holds, braking within its limits.
+FAULT = "fault"
+
+
+def _no_vectors() -> NDArray[np.float64]:
+    return np.zeros((0, 3))
+
+
+@dataclass(slots=True)
+class Tick:
+    """Result of `SafetyController.step`.
+
+    Attributes:
+        reference: Joint references for the robot.
+        cdf_n: CDF_n, the largest danger over the detected points; 0 without detection, NaN if it could not be told.
+        m: Switch (19) of the task of highest priority.
+        f: Switch (21) of the task below it; 1 if there is none.
+        activations: a_1..a_N of the tasks (m, m f).
+        regime: ``low``, ``medium`` or ``high`` danger, Table I; ``unknown`` if the input was bad.
+        phase: ``following``, ``suspended`` or ``recovering``, section IV-C.
+        status: ``ok``, ``degraded``, ``bad_input`` or ``fault``.
+        messages: What was unusual, in words.
+        solve_time: Wall time of the whole tick [s].
+        qd0: Evasive velocity q̇0 (n,) [rad/s].
+        points: Detected points that counted, (p, 3), world frame [m].
+        links: Wire link that each point belongs to, (p,), from 0.
+        vectors: Danger vectors (6) at the points, (p, 3).
+        errors: Task errors of the commanded pose against the tasks' own trajectories, per task (rows,).
+        path_time: Clock of the tasks' trajectories [s].
+        box: Admissible joint velocities of this tick; None without limits.
+        law: What the law answered, with the solution of every regime; None if it was not asked.
+        joint_names: (n,) names used in reports.
+    """
+
+    reference: JointReference
+    cdf_n: float
+    m: float
+    f: float
+    activations: tuple[float, ...]
+    regime: str
+    phase: str
+    status: str
+    messages: tuple[str, ...] = ()
+    solve_time: float = 0.0
+    qd0: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    points: NDArray[np.float64] = field(default_factory=_no_vectors)
+    links: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    vectors: NDArray[np.float64] = field(default_factory=_no_vectors)
+    errors: tuple[NDArray[np.float64], ...] = ()
+    path_time: float = 0.0
+    box: Box | None = None
+    law: LawResult | None = None
+    joint_names: tuple[str, ...] = ()
+
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Joint limits that the command touches, e.g. ``"joint_2: upper acceleration"``."""
+        return () if self.box is None else self.box.binding(self.reference.qd, self.joint_names)
+
+    @property
+    def residuals(self) -> tuple[tuple[float, tuple[float, ...]], ...]:
+        """Per regime solved: (weight, residual norm per level, the evasive level last)."""
+        return () if self.law is None else tuple((w, solution.residuals) for w, solution in self.law.regimes)
+
+    def explain(self) -> str:
+        """The tick in words, several lines."""
+        lines = [
+            f"tick {self.reference.seq} at {self.reference.time:.3f} s: {self.status}, "
+            f"{self.regime} danger, {self.phase}",
+            f"  {len(self.points)} points, CDF_n = {self.cdf_n:.3f}, m = {self.m:.3f}, f = {self.f:.3f}",
+        ]
+        for k, (error, activation) in enumerate(zip(self.errors, self.activations, strict=False)):
+            lines.append(f"  task {k + 1}: activation {activation:.3f}, error norm {np.linalg.norm(error):.3g}")
+        for weight, residuals in self.residuals:
+            levels = ", ".join(f"{value:.3g}" for value in residuals)
+            lines.append(f"  regime of {len(residuals) - 1} tasks, weight {weight:.3f}: residual per level {levels}")
+        if self.binding:
+            lines.append("  binding: " + ", ".join(self.binding))
+        lines.extend("  note: " + message for message in self.messages)
+        qd = np.array2string(self.reference.qd, precision=4, suppress_small=True)
+        lines.append(f"  q̇ = {qd} rad/s in {1e6 * self.solve_time:.0f} µs")
+        return "\n".join(lines)
+
+    __str__ = explain

@@ -1,0 +1,1 @@
+"""Bundled robots, one folder each: MJCF model, limits, wire model and spots."""

@@ -1,0 +1,119 @@
+"""The source's first experiment: a fixed tool reference while a person with a card board comes from three sides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.controller import SafetyController
+from qpsafe.laws.problem import Law
+from qpsafe.sim.choreography import Choreography
+from qpsafe.sim.distance import board_distance, person_distance
+from qpsafe.sim.log import Recorder, RunLog
+from qpsafe.sim.plant import Plant
+from qpsafe.sim.rays import cast
+from qpsafe.sim.scene import Scene, build_scene
+from qpsafe.tasks.orientation import OrientationTask
+from qpsafe.tasks.position import PositionTask
+from qpsafe.tasks.rotation import euler_zyx, log3
+from qpsafe.tasks.trajectory import FixedPose
+from qpsafe.tick import Tick
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+Observer = Callable[[Tick, Scene, Plant], None]
+
+
+@dataclass
+class FixedExperiment:
+    """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
+
+    Attributes:
+        robot: The robot, with spots.
+        law: The law, None for the controller's default.
+        seed: Varies the person's distances, directions and times a little; 0 is nominal.
+        lag: Control lag of the plant [s].
+        limits: Whether the joint limits are on.
+        duration: Length [s].
+        choreography: How the person moves; `seed` varies it.
+    """
+
+    robot: Robot
+    law: Law | None = None
+    seed: int = 0
+    lag: float = 0.0
+    limits: bool = True
+    duration: float = 60.0
+    choreography: Choreography = field(default_factory=Choreography)
+
+    def run(self, observer: Observer | None = None) -> RunLog:
+        """Run it with the controller.
+
+        Args:
+            observer: Called after every tick, e.g. to draw it or to show progress.
+
+        Raises:
+            SimulationFailedError: MuJoCo reported bad values.
+        """
+        robot, walk = self.robot, self.choreography.varied(self.seed)
+        scene = build_scene(robot)
+        plant = Plant(scene, lag=self.lag)
+        target = FixedPose(robot.pose("tcp", robot.home))
+        tasks = [PositionTask("tcp", target), OrientationTask("tcp", target)]
+        controller = SafetyController(robot, tasks, self.law, limits="robot" if self.limits else None)
+        spots = controller.spots
+        assert spots is not None
+        recorder = Recorder(controller.dt, spots.names)
+        for k in range(round(self.duration / controller.dt)):
+            scene.place_person(plant.data, walk.pose(k * controller.dt))
+            q, qd = plant.q, plant.qd
+            state = robot.at(q)
+            distances = cast(scene, plant.data, *spots.rays(state), cutoff=spots.range_max)
+            tick = controller.step(q, qd, distances)
+            reference = tick.reference
+            # reference.q holds at the end of this period: the servo is told where it starts from
+            plant.apply(reference.q - controller.dt * reference.qd, reference.qd)
+            pose = state.pose("tcp")
+            recorder.add(
+                tick,
+                q,
+                qd,
+                distances,
+                pose_error(pose, target.pose),
+                euler_error(robot.pose("tcp", reference.q), target.pose),
+                (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
+            )
+            if observer is not None:
+                observer(tick, scene, plant)
+            plant.advance()
+        return recorder.finish()
+
+    def board_distance_without_controller(self) -> NDArray[np.float64]:
+        """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
+        scene, walk, dt = build_scene(self.robot), self.choreography.varied(self.seed), 0.004
+        data = scene.make_data()
+        result = np.empty(round(self.duration / dt))
+        for k in range(len(result)):
+            scene.place_person(data, walk.pose(k * dt))
+            result[k] = board_distance(scene, data).distance
+        return result
+
+    def windows(self) -> tuple[tuple[float, float], ...]:
+        """Start and end of each approach [s]."""
+        return self.choreography.varied(self.seed).windows
+
+
+def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    """Position error (3,) [m] and rotation vector (3,) [rad] from `pose` to `target`."""
+    return target[:3, 3] - pose[:3, 3], log3(target[:3, :3] @ pose[:3, :3].T)
+
+
+def euler_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The source's orientation error: differences of the Euler angles φ, θ, ψ, wrapped to (-pi, pi] (3,) [rad]."""
+    difference = euler_zyx(target[:3, :3]) - euler_zyx(pose[:3, :3])
+    return np.pi - np.mod(np.pi - difference, 2.0 * np.pi)

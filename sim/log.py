@@ -1,0 +1,210 @@
+"""What a run leaves behind: one row a tick, the intervals of its regimes, and a CSV file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.tick import Tick
+
+Array = NDArray[np.float64]
+
+
+class Interval(NamedTuple):
+    """A stretch of time [start, end) in one regime; `end` is the start of the next one [s]."""
+
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class RunLog:
+    """A finished run, N ticks, k spots, n joints. Errors are of the commanded pose unless said otherwise.
+
+    Attributes:
+        dt: Tick [s].
+        time: (N,) [s].
+        distances: Readings of the spots (N, k) [m], +inf where nothing was seen.
+        cdf_n: (N,).
+        m, f: Switches (N,).
+        regime, phase, status: (N,) words.
+        q_ref, qd_ref: Commanded joint position and velocity (N, n) [rad, rad/s].
+        q, qd: Measured ones, at the start of the tick (N, n).
+        orientation_error, position_error: Commanded pose against the reference (N, 3) [rad, m].
+        measured_orientation_error, measured_position_error: The plant's pose against it (N, 3) [rad, m].
+        euler_error: The source's orientation error, difference of ZYX Euler angles (N, 3) [rad].
+        board_distance, person_distance: Smallest true distance robot-board, robot-person (N,) [m].
+        solve_time: Wall time of `step` (N,) [s]; the only part that differs between equal runs.
+        messages: (tick, message) of everything unusual.
+        spot_names: (k,).
+    """
+
+    dt: float
+    time: Array
+    distances: Array
+    cdf_n: Array
+    m: Array
+    f: Array
+    regime: NDArray[np.str_]
+    phase: NDArray[np.str_]
+    status: NDArray[np.str_]
+    q_ref: Array
+    qd_ref: Array
+    q: Array
+    qd: Array
+    orientation_error: Array
+    position_error: Array
+    measured_orientation_error: Array
+    measured_position_error: Array
+    euler_error: Array
+    board_distance: Array
+    person_distance: Array
+    solve_time: Array
+    messages: tuple[tuple[int, str], ...]
+    spot_names: tuple[str, ...]
+
+    def intervals(self, shortest: float = 0.0) -> list[Interval]:
+        """Regimes in the order they were entered; those shorter than `shortest` [s] are merged into the one before."""
+        return intervals(self.time, self.regime, self.dt, shortest)
+
+    def joint_rates(self) -> tuple[Array, Array]:
+        """Velocity (N-1, n) and acceleration (N-2, n) of the commanded positions, by differences."""
+        qd = np.diff(self.q_ref, axis=0) / self.dt
+        return qd, np.diff(qd, axis=0) / self.dt
+
+    def write_csv(self, path: Path) -> None:
+        """Write everything but the wall times as CSV, whole or not at all."""
+        names, columns = self._columns()
+        part = path.with_name(path.name + ".part")
+        try:
+            with part.open("w", encoding="utf-8") as file:
+                file.write(",".join(names) + "\n")
+                for row in zip(*columns, strict=True):
+                    file.write(",".join(row) + "\n")
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _columns(self) -> tuple[list[str], list[list[str]]]:
+        names, columns = [], []
+
+        def add(name: str, values: NDArray, unit: str = "") -> None:
+            label = f"{name} [{unit}]" if unit else name
+            if values.ndim == 1:
+                names.append(label)
+                columns.append([str(v) if values.dtype.kind == "U" else format(v, ".9g") for v in values])
+            else:
+                for i in range(values.shape[1]):
+                    add(f"{name}_{i + 1}", values[:, i], unit)
+
+        for name, unit in _CSV:
+            add(name, getattr(self, name), unit)
+        return names, columns
+
+
+_CSV = (
+    ("time", "s"),
+    ("cdf_n", "1/m"),
+    ("m", ""),
+    ("f", ""),
+    ("regime", ""),
+    ("phase", ""),
+    ("status", ""),
+    ("position_error", "m"),
+    ("orientation_error", "rad"),
+    ("euler_error", "rad"),
+    ("measured_position_error", "m"),
+    ("measured_orientation_error", "rad"),
+    ("board_distance", "m"),
+    ("person_distance", "m"),
+    ("q_ref", "rad"),
+    ("qd_ref", "rad/s"),
+    ("q", "rad"),
+    ("qd", "rad/s"),
+    ("distances", "m"),
+)
+
+
+def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: float = 0.0) -> list[Interval]:
+    """Stretches of equal names; those shorter than `shortest` [s] are merged into the one before them."""
+    found: list[Interval] = []
+    for t, name in zip(time, names, strict=True):
+        if found and found[-1].name == name:
+            found[-1] = found[-1]._replace(end=float(t) + dt)
+        else:
+            found.append(Interval(str(name), float(t), float(t) + dt))
+    merged: list[Interval] = []
+    for item in found:
+        if merged and (item.end - item.start < shortest or merged[-1].name == item.name):
+            merged[-1] = merged[-1]._replace(end=item.end)
+        else:
+            merged.append(item)
+    return merged
+
+
+class Recorder:
+    """Collects ticks and turns them into a `RunLog`."""
+
+    def __init__(self, dt: float, spot_names: tuple[str, ...]) -> None:
+        self.dt = dt
+        self.spot_names = spot_names
+        self._rows: list[tuple] = []
+        self._messages: list[tuple[int, str]] = []
+
+    def add(
+        self,
+        tick: Tick,
+        q: Array,
+        qd: Array,
+        distances: Array,
+        measured: tuple[Array, Array],
+        euler: Array,
+        gaps: tuple[float, float],
+    ) -> None:
+        """Record one tick.
+
+        Args:
+            tick: From the controller; two tasks, position first.
+            q, qd: Measured joints (n,).
+            distances: Readings of the spots (k,).
+            measured: Position (3,) and orientation error (3,) of the measured pose.
+            euler: Euler-angle error of the commanded pose (3,).
+            gaps: Smallest true distances robot-board, robot-person [m].
+        """
+        self._messages.extend((len(self._rows), message) for message in tick.messages)
+        position, orientation = tick.errors if tick.errors else (np.full(3, np.nan), np.full(3, np.nan))
+        self._rows.append(
+            (
+                tick.reference.time,
+                distances,
+                tick.cdf_n,
+                tick.m,
+                tick.f,
+                tick.regime,
+                tick.phase,
+                tick.status,
+                tick.reference.q,
+                tick.reference.qd,
+                q,
+                qd,
+                orientation,
+                position,
+                measured[1],
+                measured[0],
+                euler,
+                *gaps,
+                tick.solve_time,
+            )
+        )
+
+    def finish(self) -> RunLog:
+        """The run so far as arrays."""
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        return RunLog(self.dt, *columns, messages=tuple(self._messages), spot_names=self.spot_names)

@@ -1,0 +1,1 @@
+"""What the robot is asked to do: tasks and the trajectories they follow."""

@@ -1,0 +1,34 @@
+"""Rotation matrices, rotation vectors and the source's Euler angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+
+def log3(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation vector (3,) of a rotation matrix (3, 3), its norm the angle in [0, pi]."""
+    return pin.log3(np.ascontiguousarray(R))
+
+
+def exp3(w: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrix (3, 3) of a rotation vector (3,)."""
+    return pin.exp3(w)
+
+
+def is_rotation(R: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
+    """Whether R (3, 3) is orthogonal with determinant +1 within `tolerance`."""
+    return bool(np.abs(R @ R.T - np.eye(3)).max() <= tolerance and np.linalg.det(R) > 0.0)
+
+
+def euler_zyx(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Euler angles (φ, θ, ψ) about z, y', x'' of rotation matrices (..., 3, 3): R = Rz(φ) Ry(θ) Rx(ψ), (..., 3) [rad].
+
+    The source does not name its convention; this is the one of ABB's controllers. It is singular at θ = ±pi/2, where φ
+    and ψ are not unique. Offered for comparison and plots.
+    """
+    phi = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    theta = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
+    psi = np.arctan2(R[..., 2, 1], R[..., 2, 2])
+    return np.stack((phi, theta, psi), axis=-1)
