@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.activation import Activation, Threshold
+from qpsafe.checks import check_arguments, check_parts, checked_spots, checked_velocity, default_activation
+from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.errors import ConfigurationError
@@ -18,7 +19,7 @@ from qpsafe.laws.problem import Law, LawProblem, TaskVelocity
 from qpsafe.limits import Box, JointLimits
 from qpsafe.recovery import Recovery
 from qpsafe.reference import JointReference
-from qpsafe.sensing.detection import BadInput, as_detection, as_joint_vector
+from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
@@ -65,23 +66,22 @@ class SafetyController:
         spots: SpotArray | None = None,
         hold_time: float = 0.3,
     ) -> None:
-        _check(robot, tasks, law, dt)
+        check_arguments(robot, tasks, law, dt)
+        check_parts(robot, dt, field, activation, evasion, limits)
         self.robot = robot
         self.tasks = tuple(tasks)
         self.law = HierarchicalLaw() if law is None else law
         self.dt = float(dt)
         self.field = DangerField() if field is None else field
-        self.activation = _default_activation(self.tasks) if activation is None else activation
+        self.activation = default_activation(self.tasks) if activation is None else activation
         if len(self.activation.thresholds) != len(self.tasks):
             found = len(self.activation.thresholds)
             raise ConfigurationError("SafetyController", "activation", f"{found} thresholds", f"{len(self.tasks)}")
         self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
         own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
-        if isinstance(limits, str) and limits != "robot":
-            raise ConfigurationError("SafetyController", "limits", limits, '"robot", a JointLimits or None')
         self.limits = own if isinstance(limits, str) else limits
         self._brake_limits = self.limits or own
-        self.spots = load_spots(robot) if spots is None else spots
+        self.spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
         self._hold = PointHold(hold_time, self.dt)
         self.reset()
 
@@ -112,18 +112,20 @@ class SafetyController:
         """
         start = time.perf_counter()
         self._seq += 1
+        clocks = self.recovery.clocks
         try:
             tick = self._step(q, qd, distances, points)
         except BadInput as problem:
             tick = self._brake(BAD_INPUT, str(problem))
-        except Exception as error:  # the loop must go on: report, brake, hold
+        except Exception as error:  # the loop must go on: report, brake, hold; the path waits for the robot
+            self.recovery.clocks = clocks
             tick = self._brake(FAULT, f"{type(error).__name__}: {error}")
         tick.solve_time = time.perf_counter() - start
         return tick
 
     def _step(self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None) -> Tick:
-        q = as_joint_vector("q", q, self.robot.nq)
-        qd = as_joint_vector("qd", qd, self.robot.nq)
+        q = as_joint_position(q, self.robot)
+        qd = as_joint_velocity(qd, self.robot)
         if not self._active:  # the commanded configuration starts where the robot is
             self._q, self._qd, self._active = q.copy(), np.zeros(self.robot.nq), True
 
@@ -135,11 +137,11 @@ class SafetyController:
         # danger (1)-(6); its vectors summed per link (8), as virtual torque (14), (15), as evasive velocity (16)
         danger, gradient = self.field.evaluate(seen.points, wire)
         vectors = danger_vectors(danger, gradient)
-        if not (np.isfinite(danger).all() and np.isfinite(vectors).all()):
-            raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
         cdf_n = float(danger.max(initial=0.0))  # L∞ norm over the points
-        forces = link_vectors(vectors, seen.links, len(self.robot.wire_frames))
-        qd0 = self.evasion.step(virtual_torque(measured, forces))
+        torque = virtual_torque(measured, link_vectors(vectors, seen.links, len(self.robot.wire_frames)))
+        if not (np.isfinite(danger).all() and np.isfinite(torque).all()):  # never into the filter, which remembers
+            raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
+        qd0 = self.evasion.step(torque).copy()
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         activations = self.activation.activations(cdf_n)
@@ -152,24 +154,23 @@ class SafetyController:
 
         # tasks + q̇0 + activations + limits -> law -> q̇, checked
         box = self.limits.box(self._q, self._qd) if self.limits else None
-        bounds = (box.lower, box.upper) if box else (None, None)
-        result = self.law.solve(LawProblem(tuple(tasks), qd0, activations, *bounds))
-        if not np.isfinite(result.qd).all():
-            return self._brake(FAULT, "the law returned a velocity that is not finite")
-        status, messages, command = self._inside(result.qd, box)
+        bounds = (box.lower.copy(), box.upper.copy()) if box else (None, None)
+        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, *bounds))
+        status, messages, command = self._inside(checked_velocity(result, self._q, self.dt), box)
         if result.status != "solved":
             status, messages = DEGRADED, (*messages, f"law: {result.status}")
 
-        # integrate -> joint reference
+        # integrate -> joint reference, now that nothing of the user's can fail any more
+        regime, switches = self.activation.regime(cdf_n), self.activation.switches(cdf_n)
+        errors = self._errors(commanded)
         self._advance(command)
-        switches = self.activation.switches(cdf_n)
         return Tick(
             reference=self._reference(),
             cdf_n=cdf_n,
             m=switches[0],
             f=switches[1] if len(switches) > 1 else 1.0,
             activations=activations,
-            regime=self.activation.regime(cdf_n),
+            regime=regime,
             phase=self.recovery.phase,
             status=status,
             messages=messages,
@@ -177,7 +178,7 @@ class SafetyController:
             points=seen.points,
             links=seen.links,
             vectors=vectors,
-            errors=self._path_errors(commanded),
+            errors=errors,
             path_time=self.recovery.path_time,
             box=box,
             law=result,
@@ -199,7 +200,9 @@ class SafetyController:
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
         box = self._brake_limits.box(self._q, self._qd)
-        self._advance(box.clip(np.zeros(self.robot.nq)))
+        most = self._brake_limits.max_acceleration * self.dt
+        self._advance(self._qd - np.clip(self._qd, -most, most))  # inside the box, whose speeds can all be braked
+        qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # no danger is known: what was known fades
         none = (0.0,) * len(self.tasks)
         return Tick(
             reference=self._reference(),
@@ -211,7 +214,7 @@ class SafetyController:
             phase=self.recovery.phase,
             status=status,
             messages=(message,),
-            qd0=self.evasion.velocity,
+            qd0=qd0,
             path_time=self.recovery.path_time,
             box=box,
             joint_names=self.robot.joint_names,
@@ -224,41 +227,7 @@ class SafetyController:
     def _reference(self) -> JointReference:
         return JointReference(self._seq, self._seq * self.dt, self._q.copy(), self._qd.copy(), self._active)
 
-    def _path_errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:
+    def _errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:
         """Errors against the tasks' own trajectories, not against a recovery move."""
         t = self.recovery.path_time
         return tuple(task.error(state.pose(task.frame), task.trajectory.sample(t)) for task in self.tasks)
-
-
-def _default_activation(tasks: tuple[Task, ...]) -> Activation:
-    """The source's thresholds: (18) for one task, (22) for two."""
-    if len(tasks) == 1:
-        return Activation((Threshold(11.5, 0.15),))
-    if len(tasks) == 2:
-        return Activation()
-    raise ConfigurationError(
-        "SafetyController", "activation", None, f"an Activation with {len(tasks)} thresholds for as many tasks"
-    )
-
-
-def _check(robot: Robot, tasks: Sequence[Task], law: Law | None, dt: float) -> None:
-    """Refuse a configuration that cannot work, by name."""
-    from qpsafe.tasks.task import Task
-
-    if not hasattr(robot, "wire_frames"):
-        raise ConfigurationError("SafetyController", "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
-    if not tasks:
-        raise ConfigurationError("SafetyController", "tasks", tasks, "at least one task")
-    if not (isinstance(dt, int | float) and np.isfinite(dt) and dt > 0.0):
-        raise ConfigurationError("SafetyController", "dt", dt, "a finite time > 0 [s]")
-    if law is not None and not callable(getattr(law, "solve", None)):
-        raise ConfigurationError("SafetyController", "law", law, "a law with solve(problem), e.g. HierarchicalLaw()")
-    for k, task in enumerate(tasks):
-        if not isinstance(task, Task):
-            raise ConfigurationError("SafetyController", f"tasks[{k}]", task, "a Task, e.g. PositionTask")
-        if task.frame not in robot.frame_names:
-            expected = "one of " + ", ".join(robot.frame_names)
-            raise ConfigurationError("SafetyController", f"tasks[{k}].frame", task.frame, expected)
-        if not task.gain * dt < 1.0:
-            expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
-            raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)

@@ -82,12 +82,12 @@ class JointLimits:
         dt: float = 0.004,
         return_speed: float = 0.1,
     ) -> None:
-        self.lower = np.array(lower, dtype=float)
-        self.upper = np.array(upper, dtype=float)
-        self.max_velocity = np.array(max_velocity, dtype=float)
-        self.max_acceleration = np.array(max_acceleration, dtype=float)
-        self.dt = float(dt)
-        self.return_speed = float(return_speed)
+        self.lower = _numbers("lower", lower)
+        self.upper = _numbers("upper", upper)
+        self.max_velocity = _numbers("max_velocity", max_velocity)
+        self.max_acceleration = _numbers("max_acceleration", max_acceleration)
+        self.dt = float(_numbers("dt", dt, 0))
+        self.return_speed = float(_numbers("return_speed", return_speed, 0))
         shape = self.lower.shape
         for key in ("upper", "max_velocity", "max_acceleration"):
             if getattr(self, key).shape != shape:
@@ -114,6 +114,17 @@ class JointLimits:
         limits = (self.lower, self.upper, self.max_velocity, self.max_acceleration)
         _box(q, qd, *limits, self.dt, self.return_speed, bounds, kinds)
         return Box(bounds[0], bounds[1], kinds[0], kinds[1], kinds[2])
+
+
+def _numbers(key: str, value: ArrayLike, ndim: int = 1) -> NDArray[np.float64]:
+    """`value` as an array of its own, or a ConfigurationError."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.ndim != ndim:
+        raise ConfigurationError("JointLimits", key, value, "a number" if ndim == 0 else "one number a joint")
+    return array
 
 
 @njit("float64(float64, float64, float64)", cache=True)
@@ -157,7 +168,7 @@ def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  #
         p_hi = _position_bound(upper[i] - q[i], a, dt, return_speed)
         p_lo = -_position_bound(q[i] - lower[i], a, dt, return_speed)
         # where the position bound is out of reach, the nearest speed that is not (1e-9: rounding is no sacrifice)
-        if p_hi < lo - 1e-9 or p_lo > hi + 1e-9:
+        if p_hi < lo - 1e-9 or p_lo > hi + 1e-9 or q[i] < lower[i] - 1e-9 or q[i] > upper[i] + 1e-9:
             sacrificed = max(sacrificed, 1)
         old_lo, old_hi = lo, hi
         if p_hi < hi:

@@ -53,6 +53,15 @@ class Recovery:
         self._moves: dict[tuple[str, int], SmoothMove] = {}
         self._move_time = 0.0
 
+    @property
+    def clocks(self) -> tuple[float, float]:
+        """Times on the path and on the recovery move [s]; set them back when the robot could not go along."""
+        return self.path_time, self._move_time
+
+    @clocks.setter
+    def clocks(self, clocks: tuple[float, float]) -> None:
+        self.path_time, self._move_time = clocks
+
     def update(
         self, cdf_n: float, pose: Callable[[str], NDArray[np.float64]], activations: tuple[float, ...]
     ) -> tuple[Sample, ...]:

@@ -92,7 +92,7 @@ class Tick:
             lines.append(f"  task {k + 1}: activation {activation:.3f}, error norm {np.linalg.norm(error):.3g}")
         for weight, residuals in self.residuals:
             levels = ", ".join(f"{value:.3g}" for value in residuals)
-            lines.append(f"  regime of {len(residuals) - 1} tasks, weight {weight:.3f}: residual per level {levels}")
+            lines.append(f"  QP of weight {weight:.3f}: residual per level, highest priority first, {levels}")
         if self.binding:
             lines.append("  binding: " + ", ".join(self.binding))
         lines.extend("  note: " + message for message in self.messages)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.robot.wire import Wire
     from qpsafe.sensing.hold import PointHold
@@ -30,13 +31,35 @@ class Detection(NamedTuple):
     links: NDArray[np.int64]
 
 
-def as_joint_vector(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
-    """`value` as a finite (n,) array of its own, or BadInput."""
+#: How far outside its limits a measured joint may be [rad], and how many times its largest speed it may have. Beyond
+#: it is no measurement but, say, degrees taken for radians.
+PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
+
+
+def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+    """Measured q (n,) [rad], finite and not absurd, as an array of its own; or BadInput."""
+    lowest, highest = robot.lower - PLAUSIBLE_EXCESS, robot.upper + PLAUSIBLE_EXCESS
+    return _as_joint_vector("q", value, lowest, highest, robot.joint_names)
+
+
+def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+    """Measured q̇ (n,) [rad/s], finite and not absurd, as an array of its own; or BadInput."""
+    highest = PLAUSIBLE_SPEED * robot.max_velocity
+    return _as_joint_vector("qd", value, -highest, highest, robot.joint_names)
+
+
+def _as_joint_vector(
+    name: str, value: ArrayLike, lowest: NDArray[np.float64], highest: NDArray[np.float64], joints: tuple[str, ...]
+) -> NDArray[np.float64]:
     array = _as_floats(name, value)
-    if array.shape != (n,):
-        raise BadInput(f"{name} has shape {array.shape}, expected ({n},)")
+    if array.shape != lowest.shape:
+        raise BadInput(f"{name} has shape {array.shape}, expected {lowest.shape}")
     if not np.isfinite(array).all():
         raise BadInput(f"{name} is not finite: {array}")
+    wild = ~((lowest <= array) & (array <= highest))
+    if wild.any():
+        values = [f"{joints[i]} = {array[i]:g}" for i in np.flatnonzero(wild)]
+        raise BadInput(f"{name} is too far outside the limits to be a measurement: " + ", ".join(values))
     return array
 
 
@@ -60,7 +83,7 @@ def as_detection(
 
     Raises:
         BadInput: Wrong shape; a distance that is NaN or below zero; a point that is not finite; both or neither kind
-            given as usable input.
+            given: silence is not safety, "nothing in sight" is said by distances of +inf or an empty list of points.
     """
     if distances is not None and points is not None:
         raise BadInput("both distances and points are given, expected one of them")
@@ -71,7 +94,7 @@ def as_detection(
         return _from_distances(state, spots, hold, array)
     if points is not None:
         return _from_points(wire, _as_floats("points", points))
-    return Detection(np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+    raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
 
 
 def _from_distances(
@@ -86,15 +109,18 @@ def _from_distances(
         raise BadInput("distances below zero or not a number: " + ", ".join(bad))
     hit = spots.detected(distances)
     points = spots.points(state, np.where(hit, distances, 0.0))
-    counts = hold.update(points, hit)
+    counts = hold.update(points, np.where(hit, distances, np.inf))
     return Detection(points[counts], spots.links[counts])
 
 
 def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
+    if points.shape == (0,):  # an empty list
+        points = points.reshape(0, 3)
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInput(f"points have shape {points.shape}, expected (p, 3)")
     if not np.isfinite(points).all():
-        raise BadInput("a point is not finite")
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        raise BadInput("points are not finite: number " + ", ".join(str(i) for i in bad))
     return Detection(points, nearest_link(points, wire))
 
 
@@ -103,13 +129,21 @@ def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
     along = wire.ends - wire.starts  # (links, 3)
     length2 = np.maximum(np.sum(along**2, axis=1), 1e-300)
     offset = points[:, None, :] - wire.starts  # (p, links, 3)
-    t = np.clip(np.sum(offset * along, axis=2) / length2, 0.0, 1.0)
-    distance2 = np.sum((offset - t[..., None] * along) ** 2, axis=2)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a point too far away for its square
+        t = np.clip(np.sum(offset * along, axis=2) / length2, 0.0, 1.0)
+        distance2 = np.sum((offset - t[..., None] * along) ** 2, axis=2)
     return np.argmin(distance2, axis=1)
 
 
 def _as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """`value` as a float64 array of its own; real numbers only: no text, no bool, nothing complex, None or masked."""
     try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise BadInput(f"{name} is not an array of numbers") from None
+        array = np.asarray(value)
+    except Exception as error:  # whatever a stranger's __array__ raises
+        raise BadInput(f"{name} is not an array of numbers ({type(error).__name__})") from None
+    if array.dtype.kind not in "fiu":
+        raise BadInput(f"{name} is not an array of real numbers but of {array.dtype}")
+    if np.ma.is_masked(value):
+        raise BadInput(f"{name} has masked values")
+    with np.errstate(over="ignore"):  # long double beyond float64 becomes infinite
+        return np.array(array, dtype=np.float64)

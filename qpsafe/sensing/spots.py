@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from qpsafe.errors import RobotFileError
+from qpsafe.errors import ConfigurationError, RobotFileError
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
 
-_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+_Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]
 
 
@@ -34,7 +35,7 @@ class Spot(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     name: str
-    link: Annotated[int, Field(ge=1)]
+    link: Annotated[int, Field(strict=True, ge=1)]
     frame: str
     position: _Vector
     direction: _Vector
@@ -45,8 +46,8 @@ class SpotFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     sensor: str
-    range_min: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-    range_max: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    range_min: _Positive
+    range_max: _Positive
     spot: list[Spot]
 
 
@@ -93,6 +94,8 @@ class SpotArray:
             raise RobotFileError(path, "file", str(path), f"a readable file ({error.strerror})") from None
         except tomllib.TOMLDecodeError as error:
             raise RobotFileError(path, "file", str(path), f"valid TOML ({error})") from None
+        except UnicodeDecodeError as error:
+            raise RobotFileError(path, "file", str(path), f"text in UTF-8 ({error})") from None
         except ValidationError as error:
             first = error.errors()[0]
             key = ".".join(str(part) for part in first["loc"])
@@ -116,6 +119,31 @@ class SpotArray:
             range_min=content.range_min,
             range_max=content.range_max,
         )
+
+    def check(self, robot: Robot) -> None:
+        """Whether `robot` can carry these spots.
+
+        Raises:
+            ConfigurationError: Arrays that do not fit together, numbers that are not finite, a direction that is not
+                a unit vector, an unknown frame, a link the robot does not have, an empty range.
+        """
+        k, links = len(self), len(robot.wire_frames)
+        for key, shape in (("links", (k,)), ("frames", (k,)), ("positions", (k, 3)), ("directions", (k, 3))):
+            if np.shape(getattr(self, key)) != shape:
+                found = f"an array of shape {np.shape(getattr(self, key))}"
+                raise ConfigurationError("SpotArray", key, found, f"shape {shape} for {k} names")
+        for frame in self.frames:
+            if frame not in robot.frame_names:
+                raise ConfigurationError("SpotArray", "frames", frame, f"one of {', '.join(robot.frame_names)}")
+        if self.links.dtype.kind not in "iu" or not ((self.links >= 0) & (self.links < links)).all():
+            raise ConfigurationError("SpotArray", "links", self.links, f"whole numbers in 0..{links - 1}")
+        if not np.isfinite(self.positions).all():
+            raise ConfigurationError("SpotArray", "positions", self.positions, "finite numbers [m]")
+        if not (np.abs(np.linalg.norm(self.directions, axis=1) - 1.0) <= 1e-6).all():
+            raise ConfigurationError("SpotArray", "directions", self.directions, "vectors of length 1")
+        if not 0.0 < self.range_min < self.range_max < np.inf:
+            found = f"{self.range_min}..{self.range_max}"
+            raise ConfigurationError("SpotArray", "range_min", found, "0 < range_min < range_max, finite [m]")
 
     def rays(self, state: RobotState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Origins (k, 3) [m] and unit directions (k, 3) of all spots in the world frame."""
