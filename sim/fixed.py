@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,16 @@ class FixedExperiment:
     duration: float = 60.0
     choreography: Choreography = field(default_factory=Choreography)
 
+    @cached_property
+    def scene(self) -> Scene:
+        """The world, built on first use."""
+        return build_scene(self.robot)
+
+    @cached_property
+    def walk(self) -> Choreography:
+        """The choreography as this seed varies it."""
+        return self.choreography.varied(self.seed)
+
     def run(self, observer: Observer | None = None) -> RunLog:
         """Run it with the controller.
 
@@ -60,8 +71,7 @@ class FixedExperiment:
         Raises:
             SimulationFailedError: MuJoCo reported bad values.
         """
-        robot, walk = self.robot, self.choreography.varied(self.seed)
-        scene = build_scene(robot)
+        robot, walk, scene = self.robot, self.walk, self.scene
         plant = Plant(scene, lag=self.lag)
         target = FixedPose(robot.pose("tcp", robot.home))
         tasks = [PositionTask("tcp", target), OrientationTask("tcp", target)]
@@ -95,7 +105,7 @@ class FixedExperiment:
 
     def board_distance_without_controller(self) -> NDArray[np.float64]:
         """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
-        scene, walk, dt = build_scene(self.robot), self.choreography.varied(self.seed), 0.004
+        scene, walk, dt = self.scene, self.walk, 0.004
         data = scene.make_data()
         result = np.empty(round(self.duration / dt))
         for k in range(len(result)):
@@ -104,8 +114,8 @@ class FixedExperiment:
         return result
 
     def windows(self) -> tuple[tuple[float, float], ...]:
-        """Start and end of each approach [s]."""
-        return self.choreography.varied(self.seed).windows
+        """Start and end of each approach that fits into the duration [s]."""
+        return tuple(window for window in self.walk.windows if window[1] <= self.duration)
 
 
 def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[NDArray, NDArray]:

@@ -82,8 +82,8 @@ MISTAKES = {
     "a tool elsewhere": ("0.0, 0.14]", "0.0, 0.15]", "tool.offset", [0.0, 0.0, 0.15], "0.14]"),
     "a tool in two dimensions": ("[0.0, 0.0, 0.14]", "[0.0, 0.14]", "tool.offset", [0.0, 0.14], "3 items"),
     "a tool of negative mass": ("mass = 0.6", "mass = -0.6", "tool.mass", -0.6, "greater"),
-    "home outside the limits": ("0.0, 60.0, 0.0]", "0.0, 116.0, 0.0]", "home[4]", 116.0, "joint_5"),
-    "home too short": ("0.0, 60.0, 0.0]", "0.0, 60.0]", "home", [0.0, 10.0, 10.0, 0.0, 60.0], "6 values"),
+    "home outside the limits": ("0.0, 85.0, 0.0]", "0.0, 116.0, 0.0]", "home[4]", 116.0, "joint_5"),
+    "home too short": ("0.0, 85.0, 0.0]", "0.0, 85.0]", "home", [0.0, -5.0, 0.0, 0.0, 85.0], "6 values"),
     "model file missing": ('model = "robot.xml"', 'model = "arm.xml"', "model", "arm.xml", "file"),
     "not TOML": ("upper = 110.0", "upper = = 110.0", "line ", "upper = = 110.0", "TOML"),
     "the same key twice": ("upper = 110.0", "lower = 110.0", "line ", "lower = 110.0", "TOML"),
@@ -143,7 +143,7 @@ def test_units_do_not_change_the_robot(folder: Path) -> None:
     text = scale("lower|upper|max_velocity|max_acceleration|theta|alpha", np.pi / 180, TEXT)
     text = scale("d|a", 1000.0, text)
     text = text.replace("[0.0, 0.0, 0.14]", "[0.0, 0.0, 140.0]")
-    text = text.replace("[0.0, 10.0, 10.0, 0.0, 60.0, 0.0]", str(GOOD.home.tolist()))
+    text = text.replace("[0.0, -5.0, 0.0, 0.0, 85.0, 0.0]", str(GOOD.home.tolist()))
     text = text.replace('angle = "deg"', 'angle = "rad"').replace('length = "m"', 'length = "mm"')
     (folder / "robot.toml").write_text(text, encoding="utf-8")
     robot = load_robot(folder)
@@ -154,7 +154,7 @@ def test_units_do_not_change_the_robot(folder: Path) -> None:
 
 def test_joint_order_in_the_file_does_not_matter(folder: Path) -> None:
     text = TEXT.replace(JOINT_2, "") + "\n" + JOINT_2
-    text = text.replace("[0.0, 10.0, 10.0, 0.0, 60.0, 0.0]", "[0.0, 10.0, 0.0, 60.0, 0.0, 10.0]")
+    text = text.replace("[0.0, -5.0, 0.0, 0.0, 85.0, 0.0]", "[0.0, 0.0, 0.0, 85.0, 0.0, -5.0]")
     (folder / "robot.toml").write_text(text, encoding="utf-8")
     robot = load_robot(folder)
     np.testing.assert_array_equal(robot.upper, GOOD.upper)

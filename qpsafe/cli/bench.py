@@ -1,0 +1,56 @@
+"""`qpsafe bench`: how long things take on this machine."""
+
+from __future__ import annotations
+
+import json as json_module
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from qpsafe.cli.common import console, progress_bar, write_text
+
+
+def bench(
+    ticks: Annotated[int, typer.Option(min=100, help="Number of controller ticks to time.")] = 20_000,
+    json: Annotated[Path | None, typer.Option(help="Also write the results to this JSON file.")] = None,
+) -> None:
+    """Time the danger field and the whole controller tick; compilation excluded, machine named."""
+    screen = console(False)
+    screen.print("Warming up (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from rich.table import Table
+
+    from qpsafe.timing import machine, time_danger_field, time_ticks
+
+    with progress_bar(screen) as progress:
+        task = progress.add_task("danger field", total=2000)
+        field = time_danger_field(2000, lambda: progress.advance(task))
+        rows = {"danger field, 20 points x 6 links": field}
+        for name, law in _laws().items():
+            task = progress.add_task(f"tick, {name}", total=ticks)
+            rows[f"controller.step, 20 detections, {name}"] = time_ticks(law, ticks, partial(progress.advance, task))
+    table = Table(title=f"Wall time [µs], one thread: {machine()['processor']}, Python {machine()['python']}")
+    table.add_column("what")
+    for heading in ("runs", "median", "p99", "p99.9", "max"):
+        table.add_column(heading, justify="right")
+    for name, t in rows.items():
+        table.add_row(name, str(t.runs), *(f"{1e6 * value:.1f}" for value in (t.median, t.p99, t.p999, t.maximum)))
+    screen.print(table)
+    if json is not None:
+        content = {"machine": machine(), "unit": "s", "results": {name: t._asdict() for name, t in rows.items()}}
+        write_text(json, json_module.dumps(content, indent=2) + "\n")
+        screen.print(f"written to {json}")
+
+
+def _laws() -> dict:
+    from qpsafe.laws.hierarchical import HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw
+    from qpsafe.laws.weighted import WeightedLaw
+
+    return {
+        "hierarchical strict": HierarchicalLaw("strict"),
+        "hierarchical paper": HierarchicalLaw("paper"),
+        "weighted": WeightedLaw(),
+        "null-space": NullspaceLaw(),
+    }

@@ -1,0 +1,91 @@
+"""What the commands share: options, progress, JSON output."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from qpsafe.laws.problem import Law
+
+
+class LawName(StrEnum):
+    """Laws that the command line offers."""
+
+    hierarchical = "hierarchical"
+    nullspace = "nullspace"
+    weighted = "weighted"
+
+
+class ProjectionName(StrEnum):
+    """Projections of the hierarchical law."""
+
+    strict = "strict"
+    paper = "paper"
+
+
+def make_law(name: LawName, projection: ProjectionName, solver: str | None = None) -> Law:
+    """The law of the given name."""
+    from qpsafe.laws.hierarchical import HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw
+    from qpsafe.laws.weighted import WeightedLaw
+
+    if name is LawName.nullspace:
+        return NullspaceLaw()
+    if name is LawName.weighted:
+        return WeightedLaw(solver=solver)
+    return HierarchicalLaw(projection.value, solver=solver)
+
+
+def console(json_output: bool) -> Console:
+    """Where people read: the screen, or standard error when a program reads standard output."""
+    from rich.console import Console
+
+    return Console(stderr=json_output)
+
+
+@contextmanager
+def progress_bar(screen: Console) -> Iterator[Progress]:
+    """A progress bar with time left."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=screen) as progress:
+        yield progress
+
+
+def print_json(value: Any) -> None:
+    """Write a value to standard output as JSON."""
+    json.dump(value, sys.stdout, indent=2, default=str)
+    sys.stdout.write("\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    part = path.with_name("." + path.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

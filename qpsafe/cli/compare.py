@@ -1,0 +1,114 @@
+"""`qpsafe compare`: the QP laws against the source's null-space laws (18) and (22)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.laws.equivalence import Deviation
+    from qpsafe.sim.compare import ClosedLoop
+
+
+def compare(
+    states: Annotated[int, typer.Option(min=18, help="Number of random states.")] = 10_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Largest deviation accepted [rad/s].")] = 1e-8,
+    closed_loop: Annotated[bool, typer.Option(help="Also compare whole runs of the first experiment.")] = True,
+    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Length of each of those runs [s].")] = 60.0,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
+) -> None:
+    """Check that the hierarchical law with the paper's projection is law (22), and say how the other laws differ.
+
+    Random states have 6, 7 and 9 joints, singular and rank-deficient tasks and m, f over [0, 1]. Whole runs compare the
+    commanded joint trajectories without limits (tolerance 1e-6 rad), and say how often limits make a difference.
+    Exit code 1 above a tolerance.
+    """
+    screen = console(json)
+    from qpsafe.laws.equivalence import compare_states
+    from qpsafe.laws.hierarchical import HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw
+    from qpsafe.laws.weighted import WeightedLaw
+
+    paper = HierarchicalLaw("paper", solver=solver)
+    runs = {
+        "paper": (paper, states, False),
+        "paper, limits inactive": (paper, states, True),
+        "null-space law": (NullspaceLaw(), states // 10, False),
+        "strict": (HierarchicalLaw("strict", solver=solver), states // 10, False),
+        "weighted 1e6 : 1e3 : 1": (WeightedLaw(1e3, solver=solver), states // 10, False),
+    }
+    found: dict[str, list[Deviation]] = {}
+    loop = None
+    with progress_bar(screen) as progress:
+        for name, (law, count, limits) in runs.items():
+            task = progress.add_task(name, total=count)
+            found[name] = compare_states(
+                law, count, seed, limits, lambda done, task=task: progress.update(task, completed=done)
+            )
+        if closed_loop:
+            from qpsafe.robot.loader import load_robot
+            from qpsafe.sim.compare import compare_closed_loop
+
+            task = progress.add_task("whole runs", total=3 * round(duration / 0.004))
+            loop = compare_closed_loop(load_robot("irb140"), duration, solver, lambda: progress.advance(task))
+    exact = [d for name in ("paper", "paper, limits inactive") for d in found[name]]
+    good = all(d.worst <= tolerance for d in exact) and (loop is None or loop.trajectory_deviation <= 1e-6)
+    if json:
+        result: dict[str, Any] = {
+            name: {d.kind: {"states": len(d.values), "worst": d.worst, "median": d.median} for d in deviations}
+            for name, deviations in found.items()
+        }
+        print_json({"states": result, "closed_loop": loop and loop.to_dict(), "tolerance": tolerance, "good": good})
+    else:
+        _show(found, loop, tolerance, good, screen)
+    if not good:
+        raise typer.Exit(1)
+
+
+def _show(
+    found: dict[str, list[Deviation]], loop: ClosedLoop | None, tolerance: float, good: bool, screen: Console
+) -> None:
+    import numpy as np
+    from rich.table import Table
+
+    table = Table(title="Deviation from eq. (22), max-norm of q̇ [rad/s]: paper projection")
+    table.add_column("states of the kind")
+    for heading in ("number", "median", "worst", "worst, limits inactive"):
+        table.add_column(heading, justify="right")
+    inactive = {d.kind: d for d in found["paper, limits inactive"]}
+    for d in found["paper"]:
+        numbers = (f"{d.median:.1e}", f"{d.worst:.1e}", f"{inactive[d.kind].worst:.1e}")
+        table.add_row(d.kind, str(len(d.values)), *numbers)
+    screen.print(table)
+
+    table = Table(title="All laws, all states")
+    table.add_column("law")
+    for heading in ("number", "median", "worst"):
+        table.add_column(heading, justify="right")
+    for name, deviations in found.items():
+        values = np.concatenate([d.values for d in deviations])
+        table.add_row(name, str(len(values)), f"{np.median(values):.1e}", f"{values.max():.1e}")
+    screen.print(table)
+    screen.print(
+        "strict differs from (22) by intent wherever tasks are not orthogonal; weighted has soft priorities",
+        style="dim",
+    )
+    if loop is not None:
+        share = 100.0 * loop.different / loop.ticks
+        screen.print(
+            f"whole runs of {loop.duration:g} s, limits off: joint trajectories within "
+            f"{loop.trajectory_deviation:.1e} rad (tolerance 1e-06)\n"
+            f"limits on: {loop.different} of {loop.ticks} ticks ({share:.2f} %) differ from (22), in {loop.explained} "
+            f"of them a limit binds; median {loop.median:.1e}, worst {loop.worst:.2g} rad/s\n"
+            f"largest step of q̇ relative to a_max dt: {loop.largest_step:.3f} with limits, "
+            f"{loop.largest_step_source:.3f} by (22) alone",
+            highlight=False,
+        )
+    screen.print(f"[green]equal within {tolerance:g}[/]" if good else f"[red]deviation above {tolerance:g}[/]")

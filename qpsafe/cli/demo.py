@@ -1,0 +1,170 @@
+"""`qpsafe demo`: the source's experiments in MuJoCo."""
+
+from __future__ import annotations
+
+import json as json_module
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, write_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.log import RunLog
+    from qpsafe.sim.report import Report
+
+app = typer.Typer(help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    """Keep `fixed` a command of its own while it is the only one."""
+
+
+@app.command()
+def fixed(
+    law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
+    projection: Annotated[
+        ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
+    ] = ProjectionName.strict,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    lag: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+    ] = 0.0,
+    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Length of the run [s].")] = 60.0,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
+    video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
+    view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """First experiment: keep a fixed tool pose while a person with a card board comes from three sides."""
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.fixed import FixedExperiment
+
+    experiment = FixedExperiment(
+        load_robot("irb140"), make_law(law, projection, solver), seed=seed, lag=lag, duration=duration
+    )
+    title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
+    out.mkdir(parents=True, exist_ok=True)
+    files = ["signals.csv", "figure.png", "distance.png", "report.json"]
+    log, filmed = _run(experiment, title, out / "video.mp4", video, view, screen)
+    if filmed:
+        files.append("video.mp4")
+    report = _write(experiment, log, title, out)
+    if json:
+        print_json(report.to_dict())
+    else:
+        show(report, title, screen)
+        screen.print(f"written to {out}: {', '.join(files)}", highlight=False)
+    if not report.kept:
+        raise typer.Exit(1)
+
+
+def _run(
+    experiment: FixedExperiment, title: str, path: Path, video: bool, view: bool, screen: Console
+) -> tuple[RunLog, bool]:
+    """Run with a progress bar, filmed if possible; says in one line why not."""
+    from qpsafe.danger.activation import Activation
+    from qpsafe.errors import MissingExtraError
+    from qpsafe.sensing.spots import load_spots
+    from qpsafe.sim.film import Film, Viewer
+    from qpsafe.sim.gl import gl_available
+
+    spots = load_spots(experiment.robot)
+    assert spots is not None
+    with ExitStack() as stack:
+        observers: list[Any] = []
+        filmed = False
+        if video and not view:
+            available, reason = gl_available()
+            try:
+                if available:
+                    film = Film(path, experiment.scene, spots, Activation())
+                    observers.append(stack.enter_context(film).observe)
+                    filmed = True
+            except MissingExtraError as error:
+                available, reason = False, str(error)
+            if not available:
+                screen.print(f"no video: {reason}", style="yellow", highlight=False)
+        if view:
+            viewer = Viewer(experiment.scene, spots, Activation())
+            stack.callback(viewer.close)
+            observers.append(viewer.observe)
+        progress = stack.enter_context(progress_bar(screen))
+        task = progress.add_task(f"{experiment.duration:g} s, 250 Hz", total=round(experiment.duration / 0.004))
+
+        def observe(*state: Any) -> None:
+            for observer in observers:
+                observer(*state)
+            progress.advance(task)
+
+        return experiment.run(observe), filmed
+
+
+def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> Report:
+    """Write csv, figures and report, each whole or not at all."""
+    from qpsafe.sim.plots import distance_figure, figure_11
+    from qpsafe.sim.report import summarise
+
+    without = experiment.board_distance_without_controller()
+    report = summarise(log, without, experiment.windows(), experiment.robot)
+    log.write_csv(out / "signals.csv")
+    figure_11(log, out / "figure.png", f"First experiment, {title}")
+    distance_figure(log, without, out / "distance.png")
+    write_text(out / "report.json", json_module.dumps(report.to_dict(), indent=2) + "\n")
+    return report
+
+
+def show(report: Report, title: str, screen: Console) -> None:
+    """Print the report as tables."""
+    from rich.table import Table
+
+    table = Table(title=f"First experiment, {title}: largest values in each regime")
+    table.add_column("danger")
+    for heading in ("entered [s]", "left [s]", "CDF_n", "pos. error [mm]", "orient. error [rad]", "measured [mm]"):
+        table.add_column(heading, justify="right")
+    table.add_column("measured [rad]", justify="right")
+    colours = {"low": "green", "medium": "yellow", "high": "red"}
+    for row in report.regimes:
+        table.add_row(
+            f"[{colours.get(row.regime, 'white')}]{row.regime}[/]",
+            f"{row.entered:.2f}",
+            f"{row.left:.2f}",
+            f"{row.cdf_n:.2f}",
+            f"{1e3 * row.position_error:.3f}",
+            f"{row.orientation_error:.4f}",
+            f"{1e3 * row.measured_position_error:.3f}",
+            f"{row.measured_orientation_error:.4f}",
+        )
+    screen.print(table)
+
+    table = Table(title="Smallest true distance between robot and board")
+    for heading in ("approach [s]", "with controller [m]", "without [m]", "gained [m]"):
+        table.add_column(heading, justify="right")
+    for approach in report.approaches:
+        gained = approach.with_controller - approach.without_controller
+        numbers = (approach.with_controller, approach.without_controller, gained)
+        table.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
+    screen.print(table)
+
+    table = Table(title="What the run should show")
+    for heading in ("", "", "measured", "promised"):
+        table.add_column(heading, overflow="fold")
+    for check in report.checks:
+        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
+        table.add_row(mark, check.name, check.measured, check.promised)
+    screen.print(table)
+    position, orientation = report.tracking
+    screen.print(
+        f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "
+        f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else ""),
+        highlight=False,
+    )

@@ -1,0 +1,50 @@
+"""`qpsafe`: the command line. Heavy parts are imported by the commands that use them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from qpsafe import __version__
+from qpsafe.cli import bench, compare, demo, robots
+from qpsafe.errors import QpsafeError
+
+app = typer.Typer(
+    help="Danger-aware hierarchical QP control for robot arms that share their space with people.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+)
+app.add_typer(demo.app, name="demo")
+app.command("compare")(compare.compare)
+app.command("robots")(robots.robots)
+app.command("bench")(bench.bench)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"qpsafe {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point: errors a person can mend are one line, without a traceback."""
+    try:
+        app()
+    except QpsafeError as error:
+        typer.secho(f"qpsafe: {error}", fg="red", err=True)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        typer.secho("qpsafe: interrupted, nothing unfinished was left behind", fg="yellow", err=True)
+        sys.exit(130)

@@ -1,0 +1,212 @@
+"""What a run of the first experiment shows: regimes, errors, distances, and whether it kept its promises."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.sim.log import RunLog
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+Window = tuple[float, float]
+LIMIT_TOLERANCE = 1e-9
+
+
+class RegimeRow(NamedTuple):
+    """One stretch in one regime: when it was entered and left [s], its largest danger and errors [m, rad]."""
+
+    regime: str
+    entered: float
+    left: float
+    cdf_n: float
+    position_error: float
+    orientation_error: float
+    measured_position_error: float
+    measured_orientation_error: float
+
+
+class ApproachRow(NamedTuple):
+    """One approach: its time [s], the smallest true distance to the board with and without the controller [m]."""
+
+    start: float
+    end: float
+    with_controller: float
+    without_controller: float
+
+
+class Check(NamedTuple):
+    """One promise: what was measured, what was promised, whether it was kept."""
+
+    name: str
+    measured: str
+    promised: str
+    kept: bool
+
+
+@dataclass(frozen=True)
+class Report:
+    """Summary of a run.
+
+    Attributes:
+        regimes: Every stretch in one regime.
+        approaches: Every approach that was complete.
+        checks: The promises.
+        tracking: Largest position (3D) and orientation difference of commanded and measured tool pose [m, rad].
+        unusual: How many ticks had a message, and the most frequent one.
+    """
+
+    regimes: list[RegimeRow]
+    approaches: list[ApproachRow]
+    checks: list[Check]
+    tracking: tuple[float, float]
+    unusual: tuple[int, str]
+
+    @property
+    def kept(self) -> bool:
+        """Whether every promise was kept."""
+        return all(check.kept for check in self.checks)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        result = asdict(self)
+        for key in ("regimes", "approaches", "checks"):
+            result[key] = [row._asdict() for row in getattr(self, key)]
+        return result | {"kept": self.kept}
+
+
+def summarise(log: RunLog, without: NDArray[np.float64], windows: tuple[Window, ...], robot: Robot) -> Report:
+    """Make the report of a run.
+
+    Args:
+        log: The run.
+        without: Distance robot-board at every tick if the robot keeps its pose (N,) [m].
+        windows: Start and end of each complete approach [s].
+        robot: For its limits.
+    """
+    checks = [*_order(log, windows), *_errors(log, windows), *_limits(log, robot)]
+    approaches = []
+    for start, end in windows:
+        inside = _between(log, start, end)
+        approaches.append(
+            ApproachRow(start, end, float(log.board_distance[inside].min()), float(without[inside].min()))
+        )
+    checks.extend(
+        Check(
+            f"distance to the board, approach at {row.start:.1f} s",
+            f"{row.with_controller:.3f} m",
+            f"> {row.without_controller:.3f} m without the controller",
+            row.with_controller > row.without_controller,
+        )
+        for row in approaches
+    )
+    words = [message for _, message in log.messages]
+    frequent = max(set(words), key=words.count) if words else ""
+    tracking = (
+        float(np.linalg.norm(log.position_error - log.measured_position_error, axis=1).max()),
+        float(np.linalg.norm(log.orientation_error - log.measured_orientation_error, axis=1).max()),
+    )
+    return Report(_regimes(log), approaches, checks, tracking, (len({tick for tick, _ in log.messages}), frequent))
+
+
+def _regimes(log: RunLog) -> list[RegimeRow]:
+    rows = []
+    for item in log.intervals():
+        inside = _between(log, item.start, item.end)
+        largest = [
+            float(_norm(error[inside]).max())
+            for error in (
+                log.position_error,
+                log.orientation_error,
+                log.measured_position_error,
+                log.measured_orientation_error,
+            )
+        ]
+        rows.append(RegimeRow(item.name, item.start, item.end, float(log.cdf_n[inside].max()), *largest))
+    return rows
+
+
+def _order(log: RunLog, windows: tuple[Window, ...]) -> list[Check]:
+    """Table I: levels are entered and left one after the other, and every approach reaches high danger."""
+    level = {"low": 0, "medium": 1, "high": 2}
+    checks = []
+    for start, end in windows:
+        inside = _between(log, start, end)
+        names = [item.name for item in log.intervals() if item.end > start and item.start < end]
+        levels = [level.get(name, 9) for name in names]
+        steps = {abs(b - a) for a, b in pairwise(levels)}
+        good = steps == {1} and levels[0] == levels[-1] == 0 and 2 in levels
+        reached = f"CDF_n up to {log.cdf_n[inside].max():.2f}"
+        checks.append(
+            Check(
+                f"order of Table I, approach at {start:.1f} s",
+                " ".join(names) + f" ({reached})",
+                "low, medium, high and back, one at a time",
+                good,
+            )
+        )
+    return checks
+
+
+def _errors(log: RunLog, windows: tuple[Window, ...]) -> list[Check]:
+    position, orientation = _norm(log.position_error), _norm(log.orientation_error)
+    checks = []
+    seen = np.flatnonzero(np.isfinite(log.distances).any(axis=1))
+    quiet = slice(0, seen[0] if len(seen) else len(log.time))
+    if position[quiet].size:
+        p, o = position[quiet].max(), orientation[quiet].max()
+        checks.append(_bound("position error before anything is detected", 1e3 * p, 0.1, "mm"))
+        checks.append(_bound("orientation error before anything is detected", o, 0.001, "rad"))
+    for start, end in windows:
+        inside = np.flatnonzero(_between(log, start, end))
+        high = inside[log.regime[inside] == "high"]
+        medium = inside[(log.regime[inside] == "medium") & (inside < (high[0] if len(high) else inside[-1] + 1))]
+        if len(medium):
+            name = f"in medium before high, approach at {start:.1f} s"
+            checks.append(_bound("position error " + name, 1e3 * position[medium].max(), 2.0, "mm"))
+            peak = orientation[medium].max()
+            checks.append(Check("orientation error " + name, f"{peak:.3f} rad", "> 0.05 rad", bool(peak > 0.05)))
+    if windows:
+        later = windows[-1][1] + 10.0
+        if later <= log.time[-1]:
+            k = int(np.searchsorted(log.time, later))
+            name = "10 s after the last withdrawal"
+            checks.append(_bound("position error " + name, 1e3 * position[k:].max(), 1.0, "mm"))
+            checks.append(_bound("orientation error " + name, orientation[k:].max(), 0.01, "rad"))
+    return checks
+
+
+def _limits(log: RunLog, robot: Robot) -> list[Check]:
+    velocity, acceleration = log.joint_rates()
+    passed = {
+        "position": max((robot.lower - log.q_ref).max(), (log.q_ref - robot.upper).max()),
+        "velocity": (np.abs(velocity) - robot.max_velocity).max(),
+        "acceleration": (np.abs(acceleration) - robot.max_acceleration).max(),
+    }
+    units = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s²"}
+    return [
+        Check(
+            f"joint {kind} limits",
+            f"passed by {excess:.1e} {units[kind]}" if excess > 0.0 else f"{abs(excess):.3g} {units[kind]} to spare",
+            f"passed by at most {LIMIT_TOLERANCE:g}",
+            bool(excess <= LIMIT_TOLERANCE),
+        )
+        for kind, excess in passed.items()
+    ]
+
+
+def _bound(name: str, value: float, bound: float, unit: str) -> Check:
+    return Check(name, f"{value:.3g} {unit}", f"< {bound:g} {unit}", bool(value < bound))
+
+
+def _between(log: RunLog, start: float, end: float) -> NDArray[np.bool_]:
+    return (log.time >= start - 1e-9) & (log.time < end - 1e-9)
+
+
+def _norm(error: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.linalg.norm(error, axis=1)
