@@ -1,0 +1,85 @@
+"""What compiled code shares: how it is compiled, how arrays reach it, and vectors as tuples, kept in registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+
+Vector = tuple[float, float, float]
+Array = NDArray[np.float64]
+
+inline = numba.njit(error_model="numpy")  # 1/0 = inf as in C; no fastmath, NaN must come through
+"""Decorator of functions that only compiled code calls."""
+
+
+def entry(signature: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Compile for one signature at import, from numba's cache where this machine has a place for one."""
+
+    def compiled(function: Callable[..., None]) -> Callable[..., None]:
+        try:
+            return numba.njit(signature, error_model="numpy", cache=True)(function)
+        except RuntimeError:  # no directory that numba may write to
+            return numba.njit(signature, error_model="numpy")(function)
+
+    return compiled
+
+
+def readable(ndim: int) -> Any:
+    """Type of a float64 array to read: any strides, read-only or not, so that nothing is compiled a second time."""
+    return types.Array(types.float64, ndim, "A", readonly=True)
+
+
+def rows(array: ArrayLike, name: str, count: int | None = None) -> Array:
+    """Return the array as an aligned float64 array of shape (count, 3); compiled code itself does not check.
+
+    Args:
+        array: (n, 3); an empty list stands for no rows.
+        name: what a person calls it, for the error.
+        count: the n that is expected; any if None.
+
+    Raises:
+        ConfigurationError: the shape is another.
+    """
+    checked = np.asarray(array, dtype=np.float64)
+    if checked.shape == (0,):
+        checked = checked.reshape(0, 3)
+    if checked.ndim != 2 or checked.shape[1] != 3 or (count is not None and checked.shape[0] != count):
+        raise ConfigurationError("danger field", name, checked.shape, f"shape ({'n' if count is None else count}, 3)")
+    return checked if checked.flags.aligned else checked.copy()
+
+
+@inline
+def dot(a: Vector, b: Vector) -> float:
+    """Return a·b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inline
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inline
+def scale(s: float, a: Vector) -> Vector:
+    """Return s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@inline
+def add(a: Vector, s: float, b: Vector) -> Vector:
+    """Return a + s b."""
+    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
+
+
+@inline
+def row(a: Array, i: int) -> Vector:
+    """Return row i of an (n, 3) array."""
+    return a[i, 0], a[i, 1], a[i, 2]
