@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -126,8 +127,13 @@ class Viewer:
 
     def _open(self, plant: Plant) -> None:
         try:
+            import glfw
             import mujoco.viewer
 
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                if not glfw.init():  # MuJoCo would end the whole process
+                    raise RuntimeError("no display")
             self._handle = mujoco.viewer.launch_passive(plant.scene.model, plant.data)
         except Exception as error:
             raise ViewerUnavailableError(f"MuJoCo's viewer cannot open a window here: {error}") from error

@@ -100,7 +100,8 @@ def _components(axis: Axes, log: RunLog, values: NDArray[np.float64], names: tup
 
 def _legend(axis: Axes, **options: Any) -> None:
     """Beside the panel, where it covers no data."""
-    axis.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0, **options)
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0, **options)
 
 
 def _shade(axis: Axes, log: RunLog) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from typing import Annotated
 
@@ -38,13 +39,23 @@ def _options(
     pass
 
 
+class _Interrupted(BaseException):
+    """Ctrl-C; a class of its own, since typer would turn KeyboardInterrupt into a bare exit code 1."""
+
+
+def _interrupt(*_: object) -> None:
+    raise _Interrupted
+
+
 def main() -> None:
-    """Entry point: errors a person can mend are one line, without a traceback."""
+    """Entry point: errors a person can mend are one line, without a traceback; Ctrl-C leaves no half files."""
+    signal.signal(signal.SIGINT, _interrupt)
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         app()
     except QpsafeError as error:
         typer.secho(f"qpsafe: {error}", fg="red", err=True)
         sys.exit(1)
-    except KeyboardInterrupt:
+    except (_Interrupted, KeyboardInterrupt):
         typer.secho("qpsafe: interrupted, nothing unfinished was left behind", fg="yellow", err=True)
         sys.exit(130)

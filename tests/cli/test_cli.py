@@ -1,0 +1,132 @@
+"""The command line as a person or a program uses it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from qpsafe import __version__
+from qpsafe.cli.main import app
+
+run = CliRunner().invoke
+PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
+
+
+@pytest.mark.parametrize("command", [[], ["demo"], ["demo", "fixed"], ["compare"], ["robots"], ["bench"]])
+def test_help_of_every_command(command: list[str]) -> None:
+    result = run(app, [*command, "--help"])
+    assert result.exit_code == 0
+    assert "Usage" in result.output
+
+
+def test_version() -> None:
+    assert run(app, ["--version"]).output.strip() == f"qpsafe {__version__}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["demo", "fixed", "--law", "magic"], ["demo", "fixed", "--lag", "-1"], ["compare", "--states", "0"], ["dance"]],
+)
+def test_wrong_usage_is_refused_before_anything_runs(arguments: list[str]) -> None:
+    result = run(app, arguments)
+    assert result.exit_code == 2
+
+
+def test_demo_writes_report_figures_and_signals(tmp_path: Path) -> None:
+    result = run(app, ["demo", "fixed", "--duration", "0.4", "--no-video", "--json", "--out", str(tmp_path / "new")])
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert report["kept"] is True
+    assert report == json.loads((tmp_path / "new" / "report.json").read_text())
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
+        "distance.png",
+        "figure.png",
+        "report.json",
+        "signals.csv",
+    ]
+
+
+def test_demo_without_opengl_says_so_in_one_line(tmp_path: Path) -> None:
+    arguments = ["demo", "fixed", "--duration", "0.2", "--out", str(tmp_path)]
+    done = subprocess.run(
+        [*PROGRAM, *arguments], env=os.environ | {"MUJOCO_GL": "disable"}, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if "no video" in line]
+    assert len(lines) == 1
+    assert "MUJOCO_GL" in lines[0]
+
+
+def test_view_without_a_display_is_one_line(tmp_path: Path) -> None:
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [*PROGRAM, "demo", "fixed", "--view", "--duration", "0.2", "--out", str(tmp_path)],
+        env=environment | {"MUJOCO_GL": "disable"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 1
+    assert "viewer cannot open a window" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupted_demo_leaves_no_files(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [*PROGRAM, "demo", "fixed", "--out", str(tmp_path / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "out").exists() and time.monotonic() < deadline:  # until it runs
+        time.sleep(0.05)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert "Traceback" not in errors
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_compare_is_honest_in_its_exit_code() -> None:
+    arguments = ["compare", "--states", "54", "--no-closed-loop", "--json"]
+    result = run(app, arguments)
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["good"] is True
+    result = run(app, [*arguments, "--tolerance", "1e-30"])
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)["good"] is False
+
+
+def test_robots_lists_and_inspects() -> None:
+    assert json.loads(run(app, ["robots", "--json"]).stdout) == ["irb140"]
+    shown = json.loads(run(app, ["robots", "irb140", "--json"]).stdout)
+    assert list(shown["joints"]) == [f"joint_{i}" for i in range(1, 7)]
+    assert len(shown["spots"]) == 20
+    assert "joint_6" in run(app, ["robots", "irb140"]).output
+
+
+def test_unknown_robot_is_one_line_and_exit_code_1() -> None:
+    done = subprocess.run([*PROGRAM, "robots", "r2d2"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr.startswith("qpsafe: ")
+    assert "irb140" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_bench_writes_its_figures(tmp_path: Path) -> None:
+    result = run(app, ["bench", "--ticks", "100", "--json", str(tmp_path / "bench.json")])
+    assert result.exit_code == 0, result.output
+    content = json.loads((tmp_path / "bench.json").read_text())
+    for times in content["results"].values():
+        assert 0.0 < times["median"] <= times["p99"] <= times["p999"] <= times["maximum"]
+    assert content["machine"]["processor"]

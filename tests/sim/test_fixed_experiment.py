@@ -1,0 +1,144 @@
+"""The source's first experiment, whole: what it must show, checked on the log."""
+
+import numpy as np
+import pytest
+
+import qpsafe
+from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.log import RunLog, intervals
+from qpsafe.sim.report import summarise
+
+ROBOT = qpsafe.load_robot("irb140")
+
+
+@pytest.fixture(scope="module")
+def experiment() -> FixedExperiment:
+    return FixedExperiment(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def log(experiment: FixedExperiment) -> RunLog:
+    return experiment.run()
+
+
+def norm(error: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(error, axis=1)
+
+
+def test_every_tick_is_fine_and_finite(log: RunLog) -> None:
+    assert len(log.time) == 15_000
+    assert set(log.status) == {"ok"}
+    assert log.messages == ()
+    for name in ("q_ref", "qd_ref", "q", "qd", "cdf_n", "position_error", "measured_position_error", "board_distance"):
+        assert np.isfinite(getattr(log, name)).all(), name
+
+
+def test_levels_of_table_1_are_entered_and_left_one_at_a_time(log: RunLog, experiment: FixedExperiment) -> None:
+    windows = experiment.windows()
+    assert len(windows) == 3
+    for start, end in windows:
+        names = [item.name for item in log.intervals() if item.end > start and item.start < end]
+        assert names == ["low", "medium", "high", "medium", "low"]
+
+
+def test_errors_stay_where_the_danger_level_allows_them(log: RunLog, experiment: FixedExperiment) -> None:
+    position, orientation = norm(log.position_error), norm(log.orientation_error)
+    seen = np.flatnonzero(np.isfinite(log.distances).any(axis=1))[0]
+    assert position[:seen].max() < 1e-4
+    assert orientation[:seen].max() < 1e-3
+    for start, end in experiment.windows():
+        inside = np.flatnonzero((log.time >= start) & (log.time < end))
+        medium = inside[: np.flatnonzero(log.regime[inside] == "high")[0]]
+        assert position[medium].max() < 2e-3
+        assert orientation[medium].max() > 0.05
+    after = log.time >= experiment.windows()[-1][1] + 10.0
+    assert after.any()
+    assert position[after].max() < 1e-3
+    assert orientation[after].max() < 1e-2
+
+
+def test_controller_keeps_the_robot_farther_from_the_board(log: RunLog, experiment: FixedExperiment) -> None:
+    without = experiment.board_distance_without_controller()
+    for start, end in experiment.windows():
+        inside = (log.time >= start) & (log.time < end)
+        assert log.board_distance[inside].min() > without[inside].min() + 0.005
+    assert without[0] == pytest.approx(log.board_distance[0], abs=1e-12)  # the same start in both
+
+
+def test_no_joint_passes_a_limit(log: RunLog) -> None:
+    velocity, acceleration = log.joint_rates()
+    assert (log.q_ref >= ROBOT.lower - 1e-9).all()
+    assert (log.q_ref <= ROBOT.upper + 1e-9).all()
+    assert (np.abs(velocity) <= ROBOT.max_velocity + 1e-9).all()
+    assert (np.abs(acceleration) <= ROBOT.max_acceleration + 1e-9).all()
+    assert (np.abs(np.diff(log.qd_ref, axis=0)) <= ROBOT.max_acceleration * log.dt + 1e-9).all()
+
+
+def test_robot_is_at_its_first_pose_again_without_a_wrist_flip(log: RunLog) -> None:
+    assert log.q_ref[-1] == pytest.approx(ROBOT.home, abs=1e-4)
+
+
+def test_shorter_run_is_the_beginning_of_the_longer_one_bit_by_bit(log: RunLog) -> None:
+    short = FixedExperiment(ROBOT, duration=9.0).run()
+    n = len(short.time)
+    for name in ("q_ref", "qd_ref", "q", "qd", "cdf_n", "distances", "board_distance", "euler_error"):
+        assert np.array_equal(getattr(short, name), getattr(log, name)[:n]), name
+
+
+def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
+    for item in log.intervals():
+        if item.name == "high":
+            inside = (log.time >= item.start) & (log.time < item.end - 1e-9)
+            assert set(log.phase[inside]) == {"suspended"}
+    phases = [item.name for item in intervals(log.time, log.phase, log.dt)]
+    assert phases == ["following", *("suspended", "recovering", "following") * 3]
+
+
+def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperiment) -> None:
+    report = summarise(log, experiment.board_distance_without_controller(), experiment.windows(), ROBOT)
+    assert report.kept, [check for check in report.checks if not check.kept]
+    assert len(report.regimes) == 13
+    assert report.tracking[0] < 2e-3
+
+
+def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment) -> None:
+    """A log with each promise broken in turn must not pass as kept."""
+    from dataclasses import replace
+
+    without = experiment.board_distance_without_controller()
+
+    def broken(log: RunLog, without: np.ndarray = without) -> set[str]:
+        report = summarise(log, without, experiment.windows(), ROBOT)
+        return {check.name.split(",")[0] for check in report.checks if not check.kept}
+
+    q = log.q_ref.copy()
+    q[7000:, 2] += 1e-3  # a jump
+    assert {"joint velocity limits", "joint acceleration limits"} & broken(replace(log, q_ref=q))
+    assert broken(replace(log, q_ref=log.q_ref + 3.0)) == {"joint position limits"}
+    assert broken(log, log.board_distance + 0.1) == {"distance to the board"}
+    regime = np.where(log.regime == "high", "medium", log.regime)
+    assert "order of Table I" in broken(replace(log, regime=regime))
+    assert broken(replace(log, position_error=log.position_error + 1e-2)) >= {
+        "position error before anything is detected",
+        "position error 10 s after the last withdrawal",
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["nullspace", "weighted", "paper"])
+def test_other_laws_keep_limits_and_order(law: str, experiment: FixedExperiment) -> None:
+    laws = {
+        "nullspace": qpsafe.NullspaceLaw(),
+        "weighted": qpsafe.WeightedLaw(),
+        "paper": qpsafe.HierarchicalLaw("paper"),
+    }
+    other = FixedExperiment(ROBOT, laws[law], lag=0.016, seed=3)
+    log = other.run()
+    velocity, acceleration = log.joint_rates()
+    assert (np.abs(velocity) <= ROBOT.max_velocity + 1e-9).all()
+    assert (np.abs(acceleration) <= ROBOT.max_acceleration + 1e-9).all()
+    assert {item.name for item in log.intervals()} == {"low", "medium", "high"}
+    without = other.board_distance_without_controller()
+    for start, end in other.windows():
+        inside = (log.time >= start) & (log.time < end)
+        assert log.board_distance[inside].min() > without[inside].min()
