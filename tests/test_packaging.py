@@ -1,0 +1,180 @@
+"""One version, one list of packages, one range of Pythons: what is promised, what the tree holds, what the wheel gets."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+from typer.testing import CliRunner
+
+import qpsafe
+
+ROOT = Path(__file__).resolve().parents[1]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PROJECT, SETUPTOOLS = PYPROJECT["project"], PYPROJECT["tool"]["setuptools"]
+FOLDERS = SETUPTOOLS["package-dir"]  # package -> folder
+HEAVY = {"mujoco", "pinocchio", "numba", "scipy", "matplotlib", "qpsolvers", "mink", "proxsuite", "daqp"}
+
+
+def modules() -> dict[str, Path]:
+    """Place in the wheel -> file, of every module in the tree; `make dev` puts links in qpsafe/, which do not count."""
+    links = {path for path in (ROOT / "qpsafe").iterdir() if path.is_symlink()}
+    found = {}
+    for package, folder in FOLDERS.items():
+        for path in (ROOT / folder).rglob("*.py"):
+            if not links & set(path.parents) and (path.parent / "__init__.py").exists():
+                found[f"{package.replace('.', '/')}/{path.relative_to(ROOT / folder).as_posix()}"] = path
+    return found
+
+
+def test_packages_are_those_in_the_tree() -> None:
+    assert set(SETUPTOOLS["packages"]) == {place.rpartition("/")[0].replace("/", ".") for place in modules()}
+
+
+def test_every_folder_with_modules_is_a_package() -> None:
+    """A forgotten __init__.py would leave modules out of the wheel. Scripts beside a robot's model are meant to be."""
+    inside = {path.parent for path in modules().values()}
+    folders = {path.parent for name in ("qpsafe", "tasks", "sim") for path in (ROOT / name).rglob("*.py")}
+    assert {folder for folder in folders if folder.resolve() == folder} <= inside
+
+
+def test_one_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert PROJECT["version"] == qpsafe.__version__ == str(citation["version"])
+    assert f"## [{qpsafe.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_citation_states_what_it_must() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["license"] == PROJECT["license"] == "Apache-2.0"
+    (paper,) = citation["references"]
+    assert {"type", "title", "authors", "journal", "year"} <= set(paper)
+    assert paper["title"].lower() in " ".join((ROOT / "README.md").read_text("utf-8").replace("> ", "").lower().split())
+
+
+def test_one_range_of_pythons() -> None:
+    """requires-python, classifiers, the workflow's matrix and the Makefile's check agree."""
+    listed = {c.rpartition(" ")[2] for c in PROJECT["classifiers"] if c.startswith("Programming Language")}
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    assert set(workflow["jobs"]["gate"]["strategy"]["matrix"]["python"]) == listed
+    allowed = Requirement(f"python{PROJECT['requires-python']}").specifier
+    assert {f"3.{minor}" for minor in range(8, 20) if allowed.contains(f"3.{minor}.1")} == listed
+    first, last = re.findall(r"\(3, (\d+)\)", (ROOT / "Makefile").read_text(encoding="utf-8"))
+    assert {f"3.{minor}" for minor in range(int(first), int(last) + 1)} == listed
+
+
+def requirements(*extras: str) -> list[Requirement]:
+    """Dependencies of the project with some extras, extras that name extras resolved."""
+    found = [Requirement(text) for text in PROJECT["dependencies"]]
+    for extra in extras:
+        for requirement in map(Requirement, PROJECT["optional-dependencies"][extra]):
+            found += requirements(*requirement.extras) if requirement.name == PROJECT["name"] else [requirement]
+    return found
+
+
+def test_constraints_pin_what_make_installs_and_name_no_host() -> None:
+    text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    assert [line for line in lines if not re.fullmatch(r"[\w.-]+==[\w.]+", line)] == []  # no address, option or path
+    pins = {canonicalize_name(name): Version(version) for name, _, version in (line.partition("==") for line in lines)}
+    assert len(pins) == len(lines)
+    assert "://" not in text
+    for requirement in requirements("dev"):
+        pin = pins.get(canonicalize_name(requirement.name))
+        assert pin is not None, f"{requirement} is not pinned"
+        assert requirement.specifier.contains(pin, prereleases=True), f"{requirement}: pinned to {pin}"
+
+
+def test_the_package_is_typed() -> None:
+    """One marker at the top covers all subpackages (PEP 561)."""
+    assert (ROOT / "qpsafe" / "py.typed").is_file()
+    assert "py.typed" in SETUPTOOLS["package-data"]["qpsafe"]
+    assert all(package.partition(".")[0] == "qpsafe" for package in SETUPTOOLS["packages"])
+
+
+def test_public_names_are_there_for_people_and_for_checkers() -> None:
+    """What is imported on first use, what static checkers are shown, and what the modules define are the same."""
+    tree = ast.parse((ROOT / "qpsafe" / "__init__.py").read_text(encoding="utf-8"))
+    guarded = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    shown = {a.asname: node.module for part in guarded for node in part.body for a in node.names}  # type: ignore[attr-defined]
+    assert shown == qpsafe._PUBLIC
+    assert set(qpsafe.__all__) == {"__version__", *shown}
+    for name, module in shown.items():
+        assert getattr(qpsafe, name) is getattr(importlib.import_module(module), name)
+
+
+@pytest.mark.parametrize("module", ["qpsafe", "qpsafe.cli.main"])
+def test_importing_loads_nothing_heavy(module: str) -> None:
+    code = f"import sys, {module}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert not HEAVY & set(loaded.stdout.split())
+
+
+def test_the_command_line_helps() -> None:
+    from qpsafe.cli.main import app
+
+    (entry,) = (e for e in metadata.entry_points(group="console_scripts") if e.name == "qpsafe")
+    assert entry.value == PROJECT["scripts"]["qpsafe"]
+    assert callable(entry.load())
+    shown = CliRunner().invoke(app, ["--help"], env={"NO_COLOR": "1", "TERM": "dumb"})
+    assert shown.exit_code == 0
+    assert all(command in shown.output for command in ("demo", "compare", "robots", "bench"))
+    assert CliRunner().invoke(app, ["--version"]).output.strip() == f"qpsafe {qpsafe.__version__}"
+    assert CliRunner().invoke(app, ["no-such-command"]).exit_code != 0
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel built from a copy of the tree, without the network."""
+    pytest.importorskip("setuptools", minversion="77", reason="building the wheel here needs setuptools >= 77")
+    copy, out = tmp_path_factory.mktemp("tree"), tmp_path_factory.mktemp("wheel")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, copy)
+    for name in FOLDERS.values():
+        links = ("tasks", "robots", "sim") if name == "qpsafe" else ()
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]", *links))
+    options = ["--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--quiet"]
+    command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(out), str(copy)]
+    subprocess.run(command, check=True, timeout=300)
+    (path,) = out.glob("*.whl")
+    return path
+
+
+def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {name for name in names if name.endswith(".py")} == set(modules())
+    assert {"qpsafe/py.typed", "qpsafe/tasks/task.py", "qpsafe/sim/__init__.py"} <= names
+    assert {f"qpsafe/robots/irb140/{name}" for name in ("robot.xml", "robot.toml", "spots.toml")} <= names
+    information = f"qpsafe-{qpsafe.__version__}.dist-info"
+    assert {name.partition("/")[0] for name in names} == {"qpsafe", information}
+    assert any(name.startswith(information) and name.endswith("/LICENSE") for name in names)
+
+
+def test_the_wheel_works_away_from_the_tree(wheel: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(wheel).extractall(tmp_path)
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "import qpsafe, qpsafe.sim, qpsafe.tasks\n"
+        "robot = qpsafe.load_robot('irb140')\n"
+        "print(qpsafe.__file__, robot.folder, len(qpsafe.load_spots(robot)))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr
+    module, folder, spots = run.stdout.split()
+    assert Path(module).is_relative_to(tmp_path)
+    assert Path(folder).is_relative_to(tmp_path)
+    assert int(spots) > 0
