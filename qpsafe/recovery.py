@@ -97,6 +97,8 @@ class Recovery:
             key = (task.frame, id(task.trajectory))
             if key not in self._moves:  # tasks on one path of one frame share one move
                 goal = task.trajectory.sample(self.path_time).pose
+                if not np.isfinite(goal).all():  # a move would keep it: stay suspended, try again at the next tick
+                    raise ValueError(f"the trajectory of the {task.name} task is not finite")
                 self._moves[key] = SmoothMove(pose(task.frame), goal, self.speed, self.angular_speed)
 
     def _sample(self, task: Task) -> Sample:
