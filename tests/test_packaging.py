@@ -1,4 +1,4 @@
-"""One version, one list of packages, one range of Pythons: what is promised, what the tree holds, what the wheel gets."""
+"""One version, one list of packages, one range of Pythons: what is promised, what is in the tree and in the wheel."""
 
 from __future__ import annotations
 
