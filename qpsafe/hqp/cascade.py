@@ -42,14 +42,39 @@ _SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
+def solve_cascade(
+    backend: str, levels: list[Level], start: Array, lower: Array, upper: Array
+) -> tuple[Array, int, list[int]]:
+    """Solve a hierarchy of usable levels.
+
+    Args:
+        backend: name of a solver of qpsolvers.
+        levels: highest priority first.
+        start: (n,) a point of the box.
+        lower: (n,) lower limits, may be infinite.
+        upper: (n,) upper limits, may be infinite.
+
+    Returns:
+        q̇ (n,) inside the box, the number of programs solved, and the levels at which the back end failed (one past the
+        last for the closing smallest norm).
+    """
+    n = start.shape[0]
+    cascade = Cascade(backend, start, lower, upper)
+    for k, level in enumerate(levels):
+        cascade.add(level, k)
+    if cascade.Z.shape[1]:
+        cascade.add(Level(np.eye(n), np.zeros(n), np.zeros(n)), len(levels))
+    return cascade.x, cascade.programs, cascade.failures
+
+
 class Cascade:
     """State of one solve: the point reached, the freedom left, the limits that hold.
 
     Attributes:
         x: (n,) point reached, inside the limits.
         Z: (n, k) orthonormal basis of the freedom left.
-        failures: what went wrong, level by level, in words; empty if nothing did.
-        iterations: quadratic programs solved.
+        failures: levels at which the back end failed.
+        programs: quadratic programs solved.
     """
 
     def __init__(self, backend: str, start: Array, lower: Array, upper: Array) -> None:
@@ -58,12 +83,12 @@ class Cascade:
         self.backend = backend
         self.x = start
         self.Z = np.eye(n)
-        self.failures: list[str] = []
-        self.iterations = 0
+        self.failures: list[int] = []
+        self.programs = 0
         self._lower, self._upper = lower, upper
         self._G, self._G_lower, self._G_upper = np.empty((0, n)), np.empty(0), np.empty(0)
 
-    def add(self, level: Level, name: str) -> None:
+    def add(self, level: Level, number: int) -> None:
         """Minimise one level over the freedom left, then take away what it used."""
         if level.rows == 0 or self.Z.shape[1] == 0:
             self._keep(level, np.zeros(level.rows, dtype=bool))
@@ -75,7 +100,7 @@ class Cascade:
         except np.linalg.LinAlgError:
             step = None
         if step is None:
-            self.failures.append(f"{self.backend} failed at {name}")
+            self.failures.append(number)
         else:
             self.x = np.clip(self.x + step, self._lower, self._upper)  # by rounding only: _solve checked it
         v = level.violations(self.x)
@@ -147,7 +172,7 @@ class Cascade:
             P, y = np.diag(hessian + prox), start
             for _ in range(_REPEATS):
                 y_next = _solve_qp(self.backend, P, gradient - prox * y, G2, h2)
-                self.iterations += 1
+                self.programs += 1
                 if y_next is None:
                     break
                 moved = float(np.max(np.abs(prox * (y_next - y)), initial=0.0))

@@ -10,7 +10,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 
-SOLVERS = ["qpsolvers:daqp", "qpsolvers:proxqp"]
+SOLVERS = ["own", "qpsolvers:daqp", "qpsolvers:proxqp"]
 
 
 def by_pseudoinverses(levels, n):
@@ -50,7 +50,7 @@ def test_equals_pseudoinverses_while_limits_are_inactive(solver, limit):
         np.testing.assert_allclose(solution.qd, expected, rtol=0, atol=1e-9 * max(1.0, np.abs(expected).max()))
 
 
-@pytest.mark.parametrize("solver", ["qpsolvers:daqp"])
+@pytest.mark.parametrize("solver", ["own", "qpsolvers:daqp"])
 def test_first_level_is_as_good_as_bounded_least_squares(solver):
     rng = np.random.default_rng(2)
     for _ in range(60):

@@ -1,0 +1,118 @@
+"""The own solver: lexicographic least squares under a box, level by level in one orthogonal basis.
+
+Algorithm:
+
+1. Start at the point of the box nearest to standstill. Fixed joints leave the freedom at once.
+2. Hard rows, if any, are an inequality level of their own on top: its least violation is zero exactly if they can be
+   met, and then they are constraints of everything below.
+3. Each level is minimised over the freedom left (`own_level.minimise_level`), which starts from the point reached
+   before: always inside the constraints, so no search for a feasible point is needed. The level takes the directions it
+   has fixed out of the freedom; its optimum can no longer change.
+4. What freedom is left goes to the smallest norm: a last level q̇ = 0.
+5. Check: every number finite, q̇ inside the box, and A q̇ of every equality level what it was when the level was left.
+
+Nothing is regularised and nothing is kept between calls, so equal data give equal bits. Work is bounded: each level
+has a limit of turns; at the limit the point reached is returned (inside the box, optimal for the levels before).
+
+Sources: A. Escande, N. Mansard, P.-B. Wieber, IJRR 33(7), 2014; D. Dimitrov, A. Sherikov, P.-B. Wieber, "Efficient
+resolution of potentially conflicting linear constraints in robotics", 2015 (LexLS).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from qpsafe.hqp.own_level import minimise_level
+from qpsafe.hqp.own_linear import Array, Index, dot, fuse
+from qpsafe.hqp.own_state import ABSENT, LOCKED, cut, load_box, load_rows
+
+# codes in info[0]
+OK, ROWS, TURNS, DATA, LIMITS, INEXACT, FAILED = range(7)
+HEADER = 3  # info = [code, turns, where, then one number a joint and row]
+
+
+@fuse
+def run(
+    floats: Array,
+    integers: Index,
+    m: int,
+    x: Array,
+    info: Index,
+    rows_A: Array,
+    rows_low: Array,
+    rows_high: Array,
+    rows_weight: Array,
+    ends: Index,
+    box_low: Array,
+    box_high: Array,
+    hard: bool,
+) -> None:
+    """Solve one hierarchy.
+
+    Args:
+        floats: workspace of `workspace(...)`.
+        integers: workspace of `workspace(...)`.
+        m: most rows in a level, at least n.
+        x: (n,) result q̇.
+        info: (3 + n + rows,) result: code, turns, level (or row) the code speaks of; then per joint and row 0, or
+            ±(1 + level) where that level presses against the upper (+) or lower (-) bound.
+        rows_A: (rows, n) rows of all levels.
+        rows_low: (rows,) their lower bounds.
+        rows_high: (rows,) their upper bounds.
+        rows_weight: (rows,) their weights, or (0,) for none.
+        ends: (levels,) one past the last row of each level.
+        box_low: (n,) lower limits.
+        box_high: (n,) upper limits.
+        hard: whether the first level are hard rows.
+    """
+    n, rows, levels = box_low.shape[0], rows_A.shape[0], ends.shape[0]
+    floats[:] = 0.0  # nothing is left of the last call: equal data, equal bits
+    integers[:] = 0
+    s = cut(floats, integers, x, rows + n, m)
+    # 1. the box and the start in it
+    start = load_box(s, box_low, box_high)
+    if start < 0:
+        info[0] = LIMITS
+        return
+    info[2] = load_rows(s, rows_A, rows_low, rows_high, rows_weight, ends)
+    if info[2] < levels:
+        info[0] = DATA
+        return
+
+    # 2. to 4. the levels, and the smallest norm
+    limit = 100 + 10 * (n + rows)
+    first = np.int64(0)
+    for level in range(levels + 1):
+        last = ends[level] if level < levels else rows + n
+        if last > first and start < n:
+            start, turns = minimise_level(s, level, first, last, start, limit)
+            info[1] += turns
+            if start < 0:
+                info[0], info[2] = TURNS, level
+                break
+        for row in range(first, last):
+            s.kept[row] = dot(s.A, row, s.x)
+        if level == 0 and hard:
+            for row in range(last):
+                slack = 1e-8 * max(1.0, abs(s.kept[row]))
+                if s.kept[row] > rows_high[row] + slack or s.kept[row] < rows_low[row] - slack:
+                    info[0] = ROWS
+        first = last
+
+    # 5. the check
+    for row in range(min(first, rows)):
+        c = n + row
+        value = dot(s.A, row, x)
+        change = abs(value - s.kept[row]) if s.kind[c] == ABSENT else max(value - s.high[c], s.low[c] - value)
+        if not change <= 1e-8 * max(1.0, abs(value)):
+            info[0], info[2] = INEXACT, row
+    finite = True
+    for c in range(n + rows):
+        if c < n:
+            finite = finite and s.low[c] <= x[c] <= s.high[c] and abs(x[c]) < np.inf
+        if s.kind[c] >= LOCKED:
+            info[HEADER + c] = s.side[c] * (1 + s.kind[c] - LOCKED)
+    if not finite:
+        info[0] = FAILED
+        for i in range(n):
+            x[i] = min(max(0.0, s.low[i]), s.high[i])

@@ -1,0 +1,281 @@
+"""One level of the own solver: least squares over the freedom left, by a primal active-set method.
+
+    min_q̇ ½ Σ v_i²,  v_i the distance of row i to its interval,  over  q̇ = x + N p  and the constraints
+
+Each turn: factorise the rows that count (equalities and rows outside their interval), step towards their least-squares
+point, stop at the first constraint met (ratio test) and hold it; where nothing stops the step, release the constraint
+whose multiplier has the wrong sign (multiplier test), or finish. After `BLAND` turns both choices follow Bland's rule,
+which cannot cycle.
+
+At the end a constraint with a clearly non-zero multiplier is active in every optimum, so it is locked for the levels
+below; the others are released and stay plain inequalities. A row of the level that stays violated keeps its violation
+(it is unique), one that is met becomes a constraint of the levels below.
+
+Sources: J. Nocedal, S. Wright, "Numerical Optimization", alg. 16.3; A. Escande, N. Mansard, P.-B. Wieber,
+"Hierarchical quadratic programming", IJRR 33(7), 2014.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from qpsafe.hqp.own_linear import along, dot, factorise, fuse, image, jit, least_squares, reflect, unturn
+from qpsafe.hqp.own_state import FREE, LOCKED, State, hold, release
+
+RANK = 1e-10  # rows shorter than this in the freedom left, relative to their level, count as dependent
+BLAND = 40  # turns after which Bland's rule chooses
+GRAZE = 1e-12  # a constraint moving slower than this, relative to the step, does not block it
+ROUNDING = 2e-14  # relative size below which a wrong sign of a multiplier is rounding
+STRICT = 1e-9  # relative size above which a multiplier is certainly not zero
+
+
+@jit
+def choose(s: State, first: int, last: int) -> tuple[int, int, float]:
+    """Which rows count at the start. Returns their number, the number of inequalities, and the norm of the level."""
+    n = s.x.shape[0]
+    count, inequalities, square = 0, 0, 0.0
+    for row in range(first, last):
+        c = n + row
+        square += image(s.A, row, s.A, row)
+        if s.low[c] == s.high[c]:
+            s.side[c] = 2
+        else:
+            value = dot(s.A, row, s.x)
+            s.side[c] = 1 if value > s.high[c] else -1 if value < s.low[c] else 0
+            inequalities += 1
+        if s.side[c] != 0:
+            s.chosen[count] = row - first
+            count += 1
+    return count, inequalities, sqrt(square)
+
+
+@jit
+def residuals(s: State, first: int, count: int) -> float:
+    """r = target - A x of the chosen rows; returns the size of the numbers they are the difference of."""
+    n = s.x.shape[0]
+    size = 0.0
+    for a in range(count):
+        row = first + s.chosen[a]
+        target = s.low[n + row] if s.side[n + row] == -1 else s.high[n + row]
+        value, magnitude = 0.0, abs(target)
+        for i in range(n):
+            term = s.A[row, i] * s.x[i]
+            value += term
+            magnitude += abs(term)
+        s.r[a] = target - value
+        size = max(size, magnitude)
+    return size
+
+
+@jit
+def load_factor(s: State, start: int, w: int, count: int, tolerance: float) -> int:
+    """Factorise the images of N under the chosen rows; returns the rank."""
+    n = s.x.shape[0]
+    k = n - start - w
+    for j in range(k):
+        for a in range(count):
+            s.F[a, j] = s.G[start + w + j, n + s.chosen[a]]
+    return factorise(s.F, s.chosen, count, k, s.tau, s.diagonal, tolerance)
+
+
+@jit
+def ratio_test(s: State, first: int, last: int, careful: bool) -> tuple[float, int]:
+    """Largest fraction of the step d that breaks no constraint, and the constraint met there (-1 if none)."""
+    n = s.x.shape[0]
+    square = 0.0
+    for i in range(n):
+        square += s.d[i] * s.d[i]
+    graze = GRAZE * sqrt(square)
+    alpha, met, speed = 1.0, -1, 0.0
+    for c in range(n + last):
+        if c < n:
+            if s.kind[c] != FREE:
+                continue
+            value, rate, slow = s.x[c], s.d[c], graze
+        elif c < n + first:  # rows of levels above
+            if s.kind[c] != FREE:
+                continue
+            row = c - n
+            value, rate, slow = dot(s.A, row, s.x), dot(s.A, row, s.d), graze * sqrt(image(s.A, row, s.A, row))
+        else:  # rows of this level that are met: the step ends where they would be violated
+            if s.side[c] != 0:
+                continue
+            row = c - n
+            value, rate, slow = dot(s.A, row, s.x), s.d[c - first], graze * sqrt(image(s.A, row, s.A, row))
+        if rate > slow:
+            t = (s.high[c] - value) / rate
+        elif rate < -slow:
+            t = (s.low[c] - value) / rate
+        else:
+            continue
+        t = max(t, 0.0)
+        if t < alpha or (t == alpha and met >= 0 and not careful and abs(rate) > abs(speed)):
+            alpha, met, speed = t, c, rate
+    if met >= 0:
+        s.side[met] = 1 if speed > 0.0 else -1
+    return alpha, met
+
+
+@jit
+def multipliers(s: State, start: int, w: int, count: int, uniform: bool, scale: float) -> float:
+    """u[:w] = λ with gradient -Aᵀr = Σ λ_j c_j over the freedom; returns the smallest pivot of the triangle."""
+    n = s.x.shape[0]
+    pivot = 1.0
+    for j in range(w - 1, -1, -1):
+        value = 0.0
+        if uniform:
+            value = -scale * along(s.G, start + j, s.r, n)
+        else:
+            for a in range(count):
+                value -= s.G[start + j, n + s.chosen[a]] * s.r[a]
+        for l in range(j + 1, w):
+            value -= s.R[j, l] * s.u[l]
+        s.u[j] = value / s.R[j, j]
+        pivot = min(pivot, abs(s.R[j, j]))
+    return pivot
+
+
+@jit
+def wrong_way(s: State, first: int, w: int, count: int, threshold: float, norm: float, careful: bool) -> int:
+    """Working constraint j, or w + index of the chosen row, that pushes the wrong way most; -1 if none does.
+
+    λ must be >= 0 at a lower bound and <= 0 at an upper one; the residual of a row is its multiplier.
+    """
+    n = s.x.shape[0]
+    worst, gone = threshold, -1
+    for j in range(w):
+        wrong = s.u[j] * s.side[s.working[j]]
+        if wrong > worst:
+            gone, worst = j, wrong
+            if careful:
+                return gone
+    for a in range(count):
+        side = s.side[n + first + s.chosen[a]]
+        if side != 2:
+            wrong = norm * s.r[a] * side
+            if wrong > worst:
+                gone, worst = w + a, wrong
+                if careful:
+                    return gone
+    return gone
+
+
+@fuse
+def minimise_level(s: State, level: int, first: int, last: int, start: int, limit: int) -> tuple[int, int]:
+    """Minimise the level of rows first..last over the freedom of basis vectors start.. .
+
+    Args:
+        s: arrays; x moves, the basis turns, locked constraints and the level's directions leave the freedom.
+        level: its number, remembered in `kind` of the constraints it locks.
+        first: first row of the level.
+        last: one past its last row.
+        start: basis vectors already used.
+        limit: turns allowed.
+
+    Returns:
+        New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
+    """
+    n, m = s.x.shape[0], last - first
+    count, inequalities, norm = choose(s, first, last)
+    scale = s.A[first, 0]
+    uniform = m == n and inequalities == 0 and scale > 0.0  # A = scale I: a projection, the usual closing level
+    for a in range(m):
+        for i in range(n):
+            uniform = uniform and s.A[first + a, i] == (scale if i == a else 0.0)
+    width = n if uniform else n + m
+    if not uniform:
+        for j in range(start, n):
+            for a in range(m):
+                s.G[j, n + a] = image(s.G, j, s.A, first + a)
+
+    tolerance = RANK * norm
+    rank, size, pivot = 0, 0.0, 1.0
+    w, turn = np.int64(0), np.int64(0)
+    while True:
+        if turn == limit:
+            return -1, int(turn)
+        turn += 1
+        # the least-squares step d over N
+        base = start + w
+        if uniform:
+            rank = n - base
+            size = residuals(s, first, count)
+            for j in range(rank):
+                s.u[j] = along(s.G, base + j, s.r, n) / scale
+        else:
+            rank = load_factor(s, start, w, count, tolerance)
+            size = residuals(s, first, count)  # after the pivoting, which permutes the rows
+            least_squares(s.F, count, rank, s.diagonal, s.r, s.u)
+            unturn(s.F, s.tau, rank, n - base, s.u)
+        # go until a constraint is met
+        met = -1
+        if rank > 0:
+            for i in range(width):
+                s.d[i] = 0.0
+            for j in range(n - base):
+                for i in range(width):
+                    s.d[i] += s.u[j] * s.G[base + j, i]
+            alpha, met = ratio_test(s, first, last, turn > BLAND)
+            for i in range(n):
+                s.x[i] = min(max(s.x[i] + alpha * s.d[i], s.low[i]), s.high[i])
+            for j in range(w):
+                c = s.working[j]
+                if c < n:
+                    s.x[c] = s.low[c] if s.side[c] < 0 else s.high[c]
+        if met >= 0:
+            if met < n:
+                s.x[met] = s.low[met] if s.side[met] < 0 else s.high[met]
+            if met < n + first:
+                hold(s, width, start, w, met)
+                w += 1
+            else:
+                s.chosen[count] = met - n - first
+                count += 1
+            continue
+        if w == 0 and inequalities == 0:
+            break
+        size = residuals(s, first, count)
+        pivot = multipliers(s, start, w, count, uniform, scale)
+        gone = wrong_way(s, first, w, count, ROUNDING * norm * size / pivot, norm, turn > BLAND)
+        if gone < 0:
+            break
+        if gone < w:
+            release(s, width, start, w, gone)
+            w -= 1
+        else:
+            s.side[n + first + s.chosen[gone - w]] = 0
+            count -= 1
+            s.chosen[gone - w] = s.chosen[count]
+
+    # lock what is active in every optimum, release the rest
+    released = False
+    for j in range(w - 1, -1, -1):
+        c = s.working[j]
+        if -s.u[j] * s.side[c] > STRICT * norm * size / pivot:
+            s.kind[c] = LOCKED + level
+        elif not uniform:
+            release(s, width, start, w, j)
+            w -= 1
+            released = True
+    if inequalities > 0:
+        for a in range(count - 1, -1, -1):
+            c = n + first + s.chosen[a]
+            if s.side[c] != 2 and abs(s.r[a]) <= STRICT * size:
+                s.side[c] = 0
+                count -= 1
+                s.chosen[a] = s.chosen[count]
+                released = True
+        for row in range(first, last):
+            c = n + row
+            if s.side[c] == 0:
+                value = dot(s.A, row, s.x)
+                s.low[c], s.high[c], s.kind[c] = min(s.low[c], value), max(s.high[c], value), FREE
+    if uniform:
+        return n, int(turn)
+    if released:
+        rank = load_factor(s, start, w, count, tolerance)
+    for step in range(rank):
+        reflect(s.G, start + w + step, n, s.F, step, step, s.tau[step], s.scratch)
+    return int(start + w + rank), int(turn)

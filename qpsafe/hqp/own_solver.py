@@ -1,0 +1,126 @@
+"""The own solver seen from Python: compiled once, then called with levels packed into arrays."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from threading import Timer
+from typing import Any
+from zlib import crc32
+
+import numba
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from qpsafe.hqp import own_hierarchy, own_level, own_linear, own_state
+from qpsafe.hqp.own_hierarchy import HEADER, run
+from qpsafe.hqp.own_state import workspace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def _read(dimensions: int) -> Any:
+    """Type of an array to read, read-only or not, so that nothing is ever compiled a second time."""
+    return types.Array(types.float64, dimensions, "C", readonly=True)
+
+
+_SIGNATURE = types.void(
+    types.float64[::1], types.int64[::1], types.int64, types.float64[::1], types.int64[::1],
+    _read(2), _read(1), _read(1), _read(1), _read(1).copy(dtype=types.int64), _read(1), _read(1), types.boolean,
+)  # fmt: skip
+
+
+def _sources() -> int:
+    """Checksum of all the code that goes into the kernel."""
+    try:
+        files = (Path(str(module.__file__)) for module in (own_linear, own_state, own_level, own_hierarchy))
+        return crc32(b"".join(file.read_bytes() for file in files))
+    except OSError:  # installed without sources
+        return 0
+
+
+def _compile(key: int) -> Callable[..., None]:
+    """Compile the solver, or load it from the cache.
+
+    The key is the state of the sources. numba's cache looks at the file and the free variables of this function only:
+    without the key it would go on using what it compiled before another file changed.
+    """
+
+    def solve(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard):  # type: ignore[no-untyped-def]
+        if key >= 0:
+            run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard)
+
+    notice = Timer(1.5, print, ["qpsafe: compiling the solver, once, takes about 10 s ..."], {"file": sys.stderr})
+    notice.daemon = True
+    notice.start()
+    try:
+        return numba.njit(_SIGNATURE, cache=True, **own_linear.OPTIONS)(solve)
+    except RuntimeError:  # no directory that numba may write to
+        return numba.njit(_SIGNATURE, **own_linear.OPTIONS)(solve)
+    finally:
+        notice.cancel()
+
+
+_solve = _compile(_sources())
+_NO_WEIGHTS = np.empty(0)
+_memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}
+
+
+def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index]:
+    """Workspace for levels of `counts` rows; kept, because its contents matter during a call only (under the GIL)."""
+    if len(_memory) >= 64:
+        _memory.clear()
+    m = max(n, *counts) if counts else n
+    memory = (*workspace(n, sum(counts), m), m, np.cumsum(counts, dtype=np.int64))
+    _memory[(n, *counts)] = memory
+    return memory
+
+
+def solve_packed(
+    A: Array,
+    low: Array,
+    high: Array,
+    weight: Array | None,
+    counts: Sequence[int],
+    box_low: Array,
+    box_high: Array,
+    hard: bool,
+) -> tuple[Array, Index]:
+    """Solve levels of `counts` rows each, packed one below the other.
+
+    Args:
+        A: (rows, n), C-contiguous.
+        low: (rows,) lower bounds.
+        high: (rows,) upper bounds.
+        weight: (rows,) weights or None.
+        counts: rows of each level.
+        box_low: (n,) lower limits.
+        box_high: (n,) upper limits.
+        hard: whether the first level are hard rows.
+
+    Returns:
+        q̇ (n,), and `info` of [`own_hierarchy.run`][qpsafe.hqp.own_hierarchy.run].
+    """
+    n = box_low.shape[0]
+    floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)
+    x = np.zeros(n)
+    info = np.zeros(HEADER + n + A.shape[0], np.int64)
+    _solve(
+        floats,
+        integers,
+        m,
+        x,
+        info,
+        A,
+        low,
+        high,
+        _NO_WEIGHTS if weight is None else weight,
+        ends,
+        box_low,
+        box_high,
+        hard,
+    )
+    return x, info

@@ -1,0 +1,158 @@
+"""The own solver's memory: one problem laid out in arrays, and what it means to hold or release a constraint."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from qpsafe.hqp.own_linear import Array, Index, householder, image, jit, reflect, remove_column
+
+HUGE = 1e60  # numbers beyond cannot be squared safely: unusable in A, no bound as bounds
+
+# kind of a constraint; LOCKED + k: locked by level k
+ABSENT, FREE, WORKING, LOCKED = 0, 1, 2, 3
+
+
+class State(NamedTuple):
+    """Arrays of one solve. Constraint c < n is joint c of the box, constraint n + i is row i; at most m rows a level.
+
+    Attributes:
+        A: (rows, n) all rows of all levels.
+        low: (n + rows,) lower bounds of the box, then of the rows.
+        high: (n + rows,) upper bounds.
+        kept: (n + rows,) values of the rows when their level was left.
+        kind: (n + rows,) ABSENT (no constraint, or not yet), FREE, WORKING or LOCKED.
+        side: (n + rows,) bound held or wanted: -1 lower, +1 upper, 2 equality, 0 none.
+        x: (n,) the point, always inside the box.
+        G: (n, n + m) basis and images, see `own_linear`.
+        R: (n, n) triangle of the working constraints in the directions Y.
+        F: (2 m, max(n, m)) factors of the level.
+        working: (n,) constraints of Y in order.
+        chosen: (m,) rows of the level that count.
+        d: (n + m,) step and its image.
+        r: (m,) residuals of the chosen rows.
+        u: (n + m,) solution in basis coordinates, then multipliers.
+        tau: (n,) reflections of F; diagonal: (n,) of L; scratch: (n + m,).
+    """
+
+    A: Array
+    low: Array
+    high: Array
+    kept: Array
+    kind: Index
+    side: Index
+    x: Array
+    G: Array
+    R: Array
+    F: Array
+    working: Index
+    chosen: Index
+    d: Array
+    r: Array
+    u: Array
+    tau: Array
+    diagonal: Array
+    scratch: Array
+
+
+def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
+    """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level."""
+    rows += n  # the closing identity
+    floats = rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 2 * n
+    return np.zeros(floats), np.zeros(2 * (n + rows) + n + m, np.int64)
+
+
+@jit
+def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
+    """The arrays of one solve, cut from two blocks: each allocation would cost as much as a factorisation."""
+    n = x.shape[0]
+    c, width = n + rows, n + m
+    A, f = f[: rows * n].reshape(rows, n), f[rows * n :]
+    G, f = f[: n * width].reshape(n, width), f[n * width :]
+    R, f = f[: n * n].reshape(n, n), f[n * n :]
+    F, f = f[: 2 * m * m].reshape(2 * m, m), f[2 * m * m :]
+    low, high, kept, f = f[:c], f[c : 2 * c], f[2 * c : 3 * c], f[3 * c :]
+    d, u, scratch, f = f[:width], f[width : 2 * width], f[2 * width : 3 * width], f[3 * width :]
+    r, tau, diagonal = f[:m], f[m : m + n], f[m + n : m + 2 * n]
+    kind, side, working, chosen = i[:c], i[c : 2 * c], i[2 * c : 2 * c + n], i[2 * c + n :]
+    return State(A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch)
+
+
+@jit
+def load_box(s: State, box_low: Array, box_high: Array) -> int:
+    """Set x, the box and the basis; fixed joints leave the freedom. Returns used columns, -1 for a bad box.
+
+    Every comparison is written so that NaN fails it.
+    """
+    n = s.x.shape[0]
+    good, fixed = True, False
+    for i in range(n):
+        s.G[i, i] = 1.0
+        s.kind[i] = FREE
+        if box_low[i] <= box_high[i] and box_low[i] < HUGE and box_high[i] > -HUGE:
+            s.low[i] = box_low[i] if box_low[i] > -HUGE else -np.inf
+            s.high[i] = box_high[i] if box_high[i] < HUGE else np.inf
+            s.x[i] = min(max(0.0, s.low[i]), s.high[i])
+            fixed = fixed or s.low[i] == s.high[i]
+        else:
+            good = False
+    start = np.int64(0)  # a typed zero: a literal would compile everything below twice
+    if fixed and good:
+        for i in range(n):
+            if s.low[i] == s.high[i]:
+                hold(s, n, start, np.int64(0), i)
+                s.kind[i] = LOCKED - 1
+                start += 1
+    return int(start) if good else -1
+
+
+@jit
+def load_rows(s: State, A: Array, low: Array, high: Array, weight: Array, ends: Index) -> int:
+    """Copy the rows times the roots of their weights, and the closing identity. Returns the first bad level."""
+    n, rows = s.x.shape[0], A.shape[0]
+    weighted = weight.shape[0] > 0
+    for level in range(ends.shape[0]):
+        first = ends[level - 1] if level > 0 else 0
+        for row in range(first, ends[level]):
+            c = n + row
+            good = low[row] <= high[row] and low[row] < HUGE and high[row] > -HUGE
+            root = 1.0
+            if weighted:
+                good = good and 0.0 < weight[row] < HUGE
+                root = sqrt(weight[row])
+            for i in range(n):
+                good = good and abs(A[row, i]) < HUGE
+                s.A[row, i] = root * A[row, i]
+            if not good:
+                return level
+            s.low[c] = root * low[row] if low[row] > -HUGE else -np.inf
+            s.high[c] = root * high[row] if high[row] < HUGE else np.inf
+    for i in range(n):
+        s.A[rows + i, i] = 1.0
+        s.low[n + rows + i] = s.high[n + rows + i] = 0.0
+    return ends.shape[0]
+
+
+@jit
+def hold(s: State, width: int, start: int, w: int, c: int) -> None:
+    """Make constraint c working number w: its direction in N becomes the last of Y."""
+    n = s.x.shape[0]
+    for j in range(n - start):
+        s.F[0, j] = s.G[start + j, c] if c < n else image(s.G, start + j, s.A, c - n)
+    for j in range(w):
+        s.R[j, w] = s.F[0, j]
+    s.R[w, w], tau = householder(s.F, 0, w, n - start)
+    reflect(s.G, start + w, width, s.F, 0, w, tau, s.scratch)
+    s.working[w] = c
+    s.kind[c] = WORKING
+
+
+@jit
+def release(s: State, width: int, start: int, w: int, j: int) -> None:
+    """Give working constraint number j of w back."""
+    s.kind[s.working[j]] = FREE
+    remove_column(s.G, width, s.R, start, w, j)
+    for l in range(j, w - 1):
+        s.working[l] = s.working[l + 1]
