@@ -125,14 +125,18 @@ def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
 
 
 def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
-    """Wire link nearest to each point (p, 3): (p,), the first one where several are equally near."""
+    """Wire link nearest to each point (p, 3): (p,), the first one where several are equally near.
+
+    Links share their ends, so that is no rare case: rounding must not decide it.
+    """
     along = wire.ends - wire.starts  # (links, 3)
     length2 = np.maximum(np.sum(along**2, axis=1), 1e-300)
     offset = points[:, None, :] - wire.starts  # (p, links, 3)
     with np.errstate(over="ignore", invalid="ignore"):  # of a point too far away for its square
         t = np.clip(np.sum(offset * along, axis=2) / length2, 0.0, 1.0)
         distance2 = np.sum((offset - t[..., None] * along) ** 2, axis=2)
-    return np.argmin(distance2, axis=1)
+        nearest = distance2 <= (1.0 + 1e-9) * np.min(distance2, axis=1, keepdims=True) + 1e-18
+    return np.argmax(nearest, axis=1)
 
 
 def _as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
