@@ -86,6 +86,8 @@ def _danger(axis: Axes, log: RunLog) -> None:
     axis.axhline(low.start, color="#2a8c3c", linestyle="-.", label="Δ$_f$(1-ε$_f$)")
     axis.set_ylabel("(b) danger\nCDF$_n$ [1/m]")
     axis.set_ylim(0.0, None)
+    for name, colour in (("medium", MEDIUM), ("high", HIGH)):
+        axis.fill_between([], [], color=colour, label=name)
     _legend(axis)
 
 

@@ -78,7 +78,7 @@ def _show(
     import numpy as np
     from rich.table import Table
 
-    table = Table(title="Deviation from eq. (22), max-norm of q̇ [rad/s]: paper projection")
+    table = Table(title="Deviation from eq. (22), max-norm of q̇ in rad/s: paper projection")
     table.add_column("states of the kind")
     for heading in ("number", "median", "worst", "worst, limits inactive"):
         table.add_column(heading, justify="right")

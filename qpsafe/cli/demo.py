@@ -127,11 +127,11 @@ def show(report: Report, title: str, screen: Console) -> None:
     """Print the report as tables."""
     from rich.table import Table
 
-    table = Table(title=f"First experiment, {title}: largest values in each regime")
+    table = Table(title=f"First experiment, {title}: largest errors in each regime, commanded and measured pose")
     table.add_column("danger")
-    for heading in ("entered [s]", "left [s]", "CDF_n", "pos. error [mm]", "orient. error [rad]", "measured [mm]"):
+    units = ("entered, s", "left, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad")
+    for heading in units:
         table.add_column(heading, justify="right")
-    table.add_column("measured [rad]", justify="right")
     colours = {"low": "green", "medium": "yellow", "high": "red"}
     for row in report.regimes:
         table.add_row(
