@@ -1,0 +1,185 @@
+"""A mistake in the configuration is an error at construction that names the argument; nothing is left for the loop."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+import qpsafe
+from qpsafe.laws.problem import LawProblem, LawResult
+
+N = 6
+
+
+def task(frame: str = "tcp", gain: float = 1.0) -> qpsafe.PositionTask:
+    return qpsafe.PositionTask(frame, qpsafe.FixedPose(np.eye(4)), gain)
+
+
+def limits(n: int = N, dt: float = 0.004) -> qpsafe.JointLimits:
+    one = np.ones(n)
+    return qpsafe.JointLimits(-one, one, one, one, dt)
+
+
+def spots(**changes: Any) -> qpsafe.SpotArray:
+    return dataclasses.replace(qpsafe.load_spots(qpsafe.load_robot("irb140")), **changes)
+
+
+class Bare:
+    """A law without solve, a field without evaluate."""
+
+
+THREE = qpsafe.Activation((qpsafe.Threshold(11.5, 0.15), qpsafe.Threshold(7.5, 0.25), qpsafe.Threshold(3.0, 0.3)))
+ONE = qpsafe.Activation((qpsafe.Threshold(11.5, 0.15),))
+
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "robot is a name": ({"robot": "irb140"}, "robot"),
+    "robot is None": ({"robot": None}, "robot"),
+    "robot is its class": ({"robot": type(qpsafe.load_robot("irb140"))}, "robot"),
+    "no tasks": ({"tasks": []}, "tasks"),
+    "tasks is None": ({"tasks": None}, "tasks"),
+    "a task that is not in a list": ({"tasks": task()}, "tasks"),
+    "a generator": ({"tasks": (task() for _ in range(2))}, "tasks"),
+    "tasks by name": ({"tasks": ["position"]}, "tasks[0]"),
+    "second is no task": ({"tasks": [task(), None]}, "tasks[1]"),
+    "a task class": ({"tasks": [qpsafe.PositionTask]}, "tasks[0]"),
+    "unknown frame": ({"tasks": [task(), task("gripper")]}, "tasks[1].frame"),
+    "frame None": ({"tasks": [task(None)]}, "tasks[0].frame"),  # type: ignore[arg-type]
+    "gain too high": ({"tasks": [task(gain=250.0)]}, "tasks[0].gain"),
+    "gain too high for dt": ({"tasks": [task(), task(gain=10.0)], "dt": 0.1}, "tasks[1].gain"),
+    "three tasks": ({"tasks": [task()] * 3}, "activation"),
+    "thresholds missing": ({"activation": ONE}, "activation"),
+    "thresholds too many": ({"activation": THREE}, "activation"),
+    "thresholds bare": ({"activation": (11.5, 7.5)}, "activation"),
+    "law by name": ({"law": "hierarchical"}, "law"),
+    "law without solve": ({"law": Bare()}, "law"),
+    "dt = 0": ({"dt": 0.0}, "dt"),
+    "dt < 0": ({"dt": -0.004}, "dt"),
+    "dt = NaN": ({"dt": np.nan}, "dt"),
+    "dt = inf": ({"dt": np.inf}, "dt"),
+    "dt is text": ({"dt": "4 ms"}, "dt"),
+    "dt is None": ({"dt": None}, "dt"),
+    "dt is True": ({"dt": True}, "dt"),
+    "field without evaluate": ({"field": Bare()}, "field"),
+    "evasion is a number": ({"evasion": 4.0}, "evasion"),
+    "evasion of seven joints": ({"evasion": qpsafe.Evasion(4.0, 20.0, 7)}, "evasion"),
+    "limits by a wrong name": ({"limits": "none"}, "limits"),
+    "limits are True": ({"limits": True}, "limits"),
+    "limits are a number": ({"limits": 1.0}, "limits"),
+    "limits of seven joints": ({"limits": limits(7)}, "limits"),
+    "limits of one joint": ({"limits": limits(1)}, "limits"),
+    "limits of another tick": ({"limits": limits(dt=0.01)}, "limits.dt"),
+    "default limits at another dt": ({"limits": limits(), "dt": 0.002}, "limits.dt"),
+    "hold_time < 0": ({"hold_time": -0.1}, "hold_time"),
+    "hold_time = NaN": ({"hold_time": np.nan}, "hold_time"),
+    "hold_time = inf": ({"hold_time": np.inf}, "hold_time"),
+    "hold_time without end": ({"hold_time": 1e308}, "hold_time"),
+    "hold_time is None": ({"hold_time": None}, "hold_time"),
+    "hold_time is text": ({"hold_time": "0.3"}, "hold_time"),
+    "spots by file name": ({"spots": "spots.toml"}, "spots"),
+}
+
+SPOTS: dict[str, tuple[dict[str, Any], str]] = {
+    "frames of another robot": ({"frames": ("link_7",) * 20}, "frames"),
+    "one frame too few": ({"frames": ("dh1",) * 19}, "frames"),
+    "links counted from 1": ({"links": np.full(20, 6)}, "links"),
+    "links below 0": ({"links": np.full(20, -1)}, "links"),
+    "links not whole": ({"links": np.full(20, 0.5)}, "links"),
+    "one link too few": ({"links": np.zeros(19, dtype=int)}, "links"),
+    "planar positions": ({"positions": np.zeros((20, 2))}, "positions"),
+    "NaN position": ({"positions": np.full((20, 3), np.nan)}, "positions"),
+    "no direction": ({"directions": np.zeros((20, 3))}, "directions"),
+    "NaN direction": ({"directions": np.full((20, 3), np.nan)}, "directions"),
+    "long direction": ({"directions": np.tile([0.0, 0.0, 1.01], (20, 1))}, "directions"),
+    "range upside down": ({"range_min": 0.9}, "range_min"),
+    "endless range": ({"range_max": np.inf}, "range_min"),
+    "NaN range": ({"range_max": np.nan}, "range_min"),
+}
+
+
+def build(irb140: Any, changes: dict[str, Any]) -> qpsafe.SafetyController:
+    return qpsafe.SafetyController(**({"robot": irb140, "tasks": [task(), task()]} | changes))
+
+
+@pytest.mark.parametrize("key", WRONG)
+def test_a_wrong_argument_is_named(irb140: Any, key: str) -> None:
+    changes, expected_key = WRONG[key]
+    with pytest.raises(qpsafe.ConfigurationError) as caught:
+        build(irb140, changes)
+    assert caught.value.where == ("SafetyController")
+    assert caught.value.key == expected_key
+    assert caught.value.expected
+    assert expected_key in str(caught.value)
+
+
+@pytest.mark.parametrize("key", SPOTS)
+def test_wrong_spots_are_named(irb140: Any, key: str) -> None:
+    changes, expected_key = SPOTS[key]
+    with pytest.raises(qpsafe.ConfigurationError) as caught:
+        build(irb140, {"spots": spots(**changes)})
+    assert (caught.value.where, caught.value.key) == ("SpotArray", expected_key)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"lower": "low"}, "lower"),
+        ({"lower": None}, "lower"),
+        ({"lower": -1.0, "upper": 1.0, "max_velocity": 1.0, "max_acceleration": 1.0}, "lower"),
+        ({"upper": [[1.0]]}, "upper"),
+        ({"max_velocity": ["fast"]}, "max_velocity"),
+        ({"max_acceleration": [np.nan]}, "max_acceleration"),
+        ({"dt": "4 ms"}, "dt"),
+        ({"dt": [0.004]}, "dt"),
+        ({"dt": np.nan}, "dt"),
+        ({"return_speed": None}, "return_speed"),
+        ({"return_speed": -0.1}, "return_speed"),
+    ],
+)
+def test_wrong_limits_are_named(changes: dict[str, Any], key: str) -> None:
+    good: dict[str, Any] = {"lower": [-1.0], "upper": [1.0], "max_velocity": [1.0], "max_acceleration": [1.0]}
+    with pytest.raises(qpsafe.ConfigurationError) as caught:
+        qpsafe.JointLimits(**(good | changes))
+    assert (caught.value.where, caught.value.key) == ("JointLimits", key)
+
+
+class Still:
+    """A law of one's own needs no more than this."""
+
+    def solve(self, problem: LawProblem) -> LawResult:
+        return LawResult(np.zeros_like(problem.qd0))
+
+
+RIGHT: dict[str, dict[str, Any]] = {
+    "defaults": {},
+    "one task": {"tasks": [task()]},
+    "a tuple of tasks": {"tasks": (task(), task())},
+    "three tasks": {"tasks": [task()] * 3, "activation": THREE},
+    "an own law": {"law": Still()},
+    "10 ms": {"dt": 0.01},
+    "whole number": {"dt": 1, "tasks": [task(gain=0.5)]},
+    "no hold": {"hold_time": 0},
+    "no limits": {"limits": None},
+    "own limits": {"limits": limits()},
+    "own evasion": {"evasion": qpsafe.Evasion(np.full(N, 2.0), np.eye(N) * 9.0, N)},
+    "own field": {"field": qpsafe.DangerField(kinetic=0.0)},
+    "own spots": {"spots": spots(range_max=1.5)},
+}
+
+
+@pytest.mark.parametrize("key", RIGHT)
+def test_what_is_right_is_accepted_and_runs(irb140: Any, key: str) -> None:
+    controller = build(irb140, RIGHT[key])
+    for _ in range(3):
+        tick = controller.step(irb140.home, np.zeros(N), np.full(20, 0.5))
+        assert tick.status in ("ok", "degraded"), tick
+        assert len(tick.activations) == len(controller.tasks)
+    assert tick.f == 1.0 or len(controller.tasks) > 1
+
+
+def test_home_outside_own_limits_does_not_move_before_there_is_data(irb140: Any) -> None:
+    controller = build(irb140, {"limits": limits()})  # home's joint 5 is beyond 1 rad
+    for _ in range(5):
+        tick = controller.step(None, None, None)  # type: ignore[arg-type]
+        assert not tick.reference.active
+        assert np.array_equal(tick.reference.q, irb140.home)
