@@ -119,7 +119,7 @@ def test_a_folder_without_robot_toml(tmp_path: Path) -> None:
 
 
 def test_a_missing_joint_is_named_when_home_is_shortened_with_it(folder: Path) -> None:
-    changes = [(JOINT_2, ""), ("home = [0.0, 10.0, ", "home = [0.0, "), (DH_ROW, ""), ('"dh0", "dh1", ', '"dh0", ')]
+    changes = [(JOINT_2, ""), ("home = [0.0, -5.0, ", "home = [0.0, "), (DH_ROW, ""), ('"dh0", "dh1", ', '"dh0", ')]
     with pytest.raises(RobotFileError) as caught:
         load_robot(write(folder, *changes))
     assert caught.value.key == "joints.joint_2"
