@@ -1,118 +1,63 @@
-"""What a spot saw and lost still counts for a while: a ray that slips off an edge has not become safe."""
+"""Keep what a spot saw for a short while after it is lost: a ray that slips off an edge has not become safe."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, entry, readable
-from qpsafe.sensing.rules import SensingRules
+from qpsafe.errors import ConfigurationError
+
+#: A reading this much farther than the last one is a different thing behind it, not the same one going away [m].
+JUMP = 0.05
 
 
 class PointHold:
-    """The point of every spot that counts, seen now or held.
+    """Last detected point of every spot, fixed in the world, forgotten `hold_time` after it was last seen.
 
-    A nearer reading, and one that goes away no faster than `jump` a tick, counts at once. A reading that jumps farther
-    away, nothing in sight, and a sick reading are not believed before they have lasted for the hold time: meanwhile the
-    last point counts and moves towards its spot at the speed of a person walking, up to d_min. Without this a
-    ray at the edge of an obstacle flickers: seen, the robot evades; lost, it comes back at once.
+    A nearer reading counts at once. A reading that jumps farther away, or is gone, counts only when the point before
+    it has not been seen for `hold_time`. Without this a ray at the edge of an obstacle flickers: seen, the robot
+    evades; lost, it comes back at once.
 
     Args:
-        count: Number of spots.
-        rules: Hold time, speed, jump, d_min.
+        hold_time: How long a lost point still counts [s]; 0 switches the hold off.
         dt: Tick [s].
-        range_max: Of each spot (k,) [m]; a reading beyond it is as good as one at it: what leaves there goes away.
+
+    Raises:
+        ConfigurationError: The hold time is negative or not finite.
     """
 
-    def __init__(self, count: int, rules: SensingRules, dt: float, range_max: Array) -> None:
-        self._limit = rules.ticks(rules.hold_time, dt)
-        self._step, self._jump, self._nearest = rules.approach_speed * dt, rules.jump, rules.d_min
-        self._range_max = range_max
-        self._count = count
+    def __init__(self, hold_time: float, dt: float) -> None:
+        number = isinstance(hold_time, int | float) and not isinstance(hold_time, bool)
+        if not (number and hold_time >= 0.0 and math.isfinite(hold_time / dt)):
+            raise ConfigurationError("SafetyController", "hold_time", hold_time, "a finite time >= 0 [s]")
+        self._limit = round(hold_time / dt)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        k = self._count
-        self.points = np.zeros((k, 3))
-        self.seen = np.full(k, np.inf)  # distance at which the spot saw its point last, +inf for none
-        self.age = np.zeros(k, dtype=np.int64)  # ticks since then
+        self._points = np.zeros((0, 3))
+        self._distances = np.zeros(0)  # at which the points were seen, +inf for none
+        self._age = np.zeros(0, dtype=np.int64)  # ticks since then
 
-    def update(self, distances: Array, counts: NDArray[np.bool_], points: Array, origins: Array) -> NDArray[np.bool_]:
-        """Take one tick's readings; which spots have a point that counts in `self.points` (k,).
+    def update(self, points: NDArray[np.float64], distances: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Take this tick's readings and put the points that are held in their place.
 
         Args:
-            distances: Readings (k,) [m]; +inf where nothing is in sight, NaN where it is not known.
-            counts: Whether what is read counts, or is a known obstacle, (k,).
-            points: What is read, (k, 3) [m].
-            origins: Of the spots now, (k, 3) [m].
+            points: One point per spot (k, 3) [m]; rows whose spot lost its point are overwritten with it.
+            distances: What the spots read now (k,) [m], +inf where nothing is detected.
+
+        Returns:
+            Which rows of `points` count (k,): seen or held.
         """
-        _hold(
-            distances,
-            counts,
-            points,
-            origins,
-            self._range_max,
-            self._limit,
-            self._step,
-            self._jump,
-            self._nearest,
-            self.seen,
-            self.age,
-            self.points,
-        )
-        return self.seen < np.inf
-
-
-@entry(
-    types.void(
-        readable(1),
-        types.Array(types.boolean, 1, "A", readonly=True),
-        readable(2),
-        readable(2),
-        readable(1),
-        types.int64,
-        types.float64,
-        types.float64,
-        types.float64,
-        types.float64[::1],
-        types.int64[::1],
-        types.float64[:, ::1],
-    )
-)
-def _hold(
-    distances: Array,
-    counts: Array,
-    points: Array,
-    origins: Array,
-    range_max: Array,
-    limit: int,
-    step: float,
-    jump: float,
-    nearest: float,
-    seen: Array,
-    age: Array,
-    held: Array,
-) -> None:
-    for i in range(distances.shape[0]):
-        d = distances[i]
-        known = d == d
-        # NaN fails: a sick reading is never believed, only waited for
-        if known and (min(d, range_max[i]) <= seen[i] + jump or age[i] >= limit):
-            age[i] = 0
-            seen[i] = d if counts[i] else np.inf
-            held[i] = points[i]
-            continue
-        if age[i] >= limit:  # sick for too long: forgotten, but never called free (the spot is dead by now)
-            seen[i] = np.inf
-        age[i] += 1
-        if seen[i] == np.inf:
-            continue
-        x, y, z = origins[i, 0] - held[i, 0], origins[i, 1] - held[i, 1], origins[i, 2] - held[i, 2]
-        distance = np.sqrt(x * x + y * y + z * z)
-        if distance > nearest:
-            share = min(step, distance - nearest) / distance
-            held[i, 0] += share * x
-            held[i, 1] += share * y
-            held[i, 2] += share * z
+        if len(self._age) != len(distances):
+            self._points = points.copy()
+            self._distances = np.full(len(distances), np.inf)
+            self._age = np.zeros(len(distances), dtype=np.int64)
+        accepted = (distances <= self._distances + JUMP) | (self._age >= self._limit)
+        self._age = np.where(accepted, 0, self._age + 1)
+        self._distances = np.where(accepted, distances, self._distances)
+        points[~accepted] = self._points[~accepted]
+        self._points = points.copy()
+        return np.isfinite(self._distances)
