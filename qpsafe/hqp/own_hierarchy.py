@@ -22,9 +22,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from qpsafe.hqp.own_damping import OFF, WITH, WITHOUT
 from qpsafe.hqp.own_level import minimise_level
-from qpsafe.hqp.own_linear import Array, Index, dot, fuse
-from qpsafe.hqp.own_state import ABSENT, LOCKED, cut, load_box, load_rows
+from qpsafe.hqp.own_linear import Array, Index, dot, fuse, jit
+from qpsafe.hqp.own_state import ABSENT, LOCKED, State, cut, load_box, load_rows
 
 # codes in info[0]
 OK, ROWS, TURNS, DATA, LIMITS, INEXACT, FAILED = range(7)
@@ -46,13 +47,14 @@ def run(
     box_low: Array,
     box_high: Array,
     hard: bool,
+    damping: float,
 ) -> None:
     """Solve one hierarchy.
 
     Args:
         floats: workspace of `workspace(...)`.
         integers: workspace of `workspace(...)`.
-        m: most rows in a level, at least n.
+        m: most rows in a level, at least n; as given to `workspace`.
         x: (n,) result q̇.
         info: (3 + n + rows,) result: code, turns, level (or row) the code speaks of; then per joint and row 0, or
             ±(1 + level) where that level presses against the upper (+) or lower (-) bound.
@@ -64,55 +66,80 @@ def run(
         box_low: (n,) lower limits.
         box_high: (n,) upper limits.
         hard: whether the first level are hard rows.
+        damping: singular values below it are damped, see `own_damping`; 0 for none.
     """
     n, rows, levels = box_low.shape[0], rows_A.shape[0], ends.shape[0]
-    floats[:] = 0.0  # nothing is left of the last call: equal data, equal bits
-    integers[:] = 0
-    s = cut(floats, integers, x, rows + n, m)
-    # 1. the box and the start in it
-    start = load_box(s, box_low, box_high)
-    if start < 0:
-        info[0] = LIMITS
-        return
-    info[2] = load_rows(s, rows_A, rows_low, rows_high, rows_weight, ends)
-    if info[2] < levels:
-        info[0] = DATA
-        return
-
-    # 2. to 4. the levels, and the smallest norm
-    limit = 100 + 10 * (n + rows)
-    first = np.int64(0)
-    for level in range(levels + 1):
-        last = ends[level] if level < levels else rows + n
-        if last > first and start < n:
-            start, turns = minimise_level(s, level, first, last, start, limit)
-            info[1] += turns
-            if start < 0:
-                info[0], info[2] = TURNS, level
-                break
-        for row in range(first, last):
-            s.kept[row] = dot(s.A, row, s.x)
-        if level == 0 and hard:
-            for row in range(last):
-                slack = 1e-8 * max(1.0, abs(s.kept[row]))
-                if s.kept[row] > rows_high[row] + slack or s.kept[row] < rows_low[row] - slack:
-                    info[0] = ROWS
-        first = last
-
+    s = cut(floats, integers, x, rows + 2 * n, m + n)
+    for mode in range(WITHOUT, WITH + 1):  # one pass is enough unless damping finds something to do
+        for i in range(n):
+            s.reference[i] = x[i]
+        floats[: floats.shape[0] - n] = 0.0  # all but the reference: equal data, equal bits
+        integers[:] = 0
+        info[0] = OK
+        # 1. the box and the start in it
+        start = load_box(s, box_low, box_high)
+        if start < 0:
+            info[0] = LIMITS
+            return
+        info[2] = load_rows(s, rows_A, rows_low, rows_high, rows_weight, ends)
+        if info[2] < levels:
+            info[0] = DATA
+            return
+        # 2. to 4. the levels, and the smallest norm
+        limit = 100 + 10 * (n + rows)
+        first = np.int64(0)
+        for level in range(levels + 1):
+            last = ends[level] if level < levels else rows + n
+            if last > first and start < n:
+                how = mode if damping > 0.0 else OFF
+                start, turns = minimise_level(s, level, first, last, start, limit, how, damping)
+                info[1] += turns
+                if start < 0:
+                    info[0], info[2] = TURNS, level
+                    break
+            for row in range(first, last):
+                s.kept[row] = dot(s.A, row, x)
+            if level == 0 and hard and violated(s, last):
+                info[0] = ROWS
+            first = last
+        if s.flags[0] == 0:
+            break
     # 5. the check
-    for row in range(min(first, rows)):
+    check(s, info, min(first, rows), rows)
+
+
+@jit
+def violated(s: State, rows: int) -> bool:
+    """Whether one of the first rows is violated at x by more than rounding."""
+    n = s.x.shape[0]
+    found = False
+    for row in range(rows):
+        c, slack = n + row, 1e-8 * max(1.0, abs(s.kept[row]))
+        # a row that is met has become a constraint; a violated one stays what its level asked for
+        found = found or s.kept[row] > s.high[c] + slack or s.kept[row] < s.low[c] - slack
+    return found
+
+
+@jit
+def check(s: State, info: Index, solved: int, rows: int) -> None:
+    """Judge the result: sets the code if a solved row has moved since its level was left, or x is not in the box."""
+    n = s.x.shape[0]
+    for row in range(solved):
         c = n + row
-        value = dot(s.A, row, x)
+        value, size = 0.0, 1.0
+        for i in range(n):
+            value += s.A[row, i] * s.x[i]
+            size += abs(s.A[row, i] * s.x[i])
         change = abs(value - s.kept[row]) if s.kind[c] == ABSENT else max(value - s.high[c], s.low[c] - value)
-        if not change <= 1e-8 * max(1.0, abs(value)):
+        if not change <= 1e-8 * size:
             info[0], info[2] = INEXACT, row
-    finite = True
+    fine = True
     for c in range(n + rows):
         if c < n:
-            finite = finite and s.low[c] <= x[c] <= s.high[c] and abs(x[c]) < np.inf
+            fine = fine and s.low[c] <= s.x[c] <= s.high[c] and abs(s.x[c]) < np.inf
         if s.kind[c] >= LOCKED:
             info[HEADER + c] = s.side[c] * (1 + s.kind[c] - LOCKED)
-    if not finite:
+    if not fine:
         info[0] = FAILED
         for i in range(n):
-            x[i] = min(max(0.0, s.low[i]), s.high[i])
+            s.x[i] = min(max(0.0, s.low[i]), s.high[i])

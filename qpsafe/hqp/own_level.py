@@ -21,12 +21,13 @@ from math import sqrt
 
 import numpy as np
 
+from qpsafe.hqp.own_damping import OFF, damp
 from qpsafe.hqp.own_linear import along, dot, factorise, fuse, image, jit, least_squares, reflect, unturn
+from qpsafe.hqp.own_rules import multipliers, ratio_test, wrong_way
 from qpsafe.hqp.own_state import FREE, LOCKED, State, hold, release
 
 RANK = 1e-10  # rows shorter than this in the freedom left, relative to their level, count as dependent
 BLAND = 40  # turns after which Bland's rule chooses
-GRAZE = 1e-12  # a constraint moving slower than this, relative to the step, does not block it
 ROUNDING = 2e-14  # relative size below which a wrong sign of a multiplier is rounding
 STRICT = 1e-9  # relative size above which a multiplier is certainly not zero
 
@@ -52,12 +53,13 @@ def choose(s: State, first: int, last: int) -> tuple[int, int, float]:
 
 
 @jit
-def residuals(s: State, first: int, count: int) -> float:
+def residuals(s: State, first: int, last: int, count: int) -> float:
     """r = target - A x of the chosen rows; returns the size of the numbers they are the difference of."""
     n = s.x.shape[0]
+    spare = s.A.shape[0] - n - (last - first)  # rows beyond those of the level are rows of damping
     size = 0.0
     for a in range(count):
-        row = first + s.chosen[a]
+        row = s.chosen[a] + (first if first + s.chosen[a] < last else spare)
         target = s.low[n + row] if s.side[n + row] == -1 else s.high[n + row]
         value, magnitude = 0.0, abs(target)
         for i in range(n):
@@ -80,90 +82,10 @@ def load_factor(s: State, start: int, w: int, count: int, tolerance: float) -> i
     return factorise(s.F, s.chosen, count, k, s.tau, s.diagonal, tolerance)
 
 
-@jit
-def ratio_test(s: State, first: int, last: int, careful: bool) -> tuple[float, int]:
-    """Largest fraction of the step d that breaks no constraint, and the constraint met there (-1 if none)."""
-    n = s.x.shape[0]
-    square = 0.0
-    for i in range(n):
-        square += s.d[i] * s.d[i]
-    graze = GRAZE * sqrt(square)
-    alpha, met, speed = 1.0, -1, 0.0
-    for c in range(n + last):
-        if c < n:
-            if s.kind[c] != FREE:
-                continue
-            value, rate, slow = s.x[c], s.d[c], graze
-        elif c < n + first:  # rows of levels above
-            if s.kind[c] != FREE:
-                continue
-            row = c - n
-            value, rate, slow = dot(s.A, row, s.x), dot(s.A, row, s.d), graze * sqrt(image(s.A, row, s.A, row))
-        else:  # rows of this level that are met: the step ends where they would be violated
-            if s.side[c] != 0:
-                continue
-            row = c - n
-            value, rate, slow = dot(s.A, row, s.x), s.d[c - first], graze * sqrt(image(s.A, row, s.A, row))
-        if rate > slow:
-            t = (s.high[c] - value) / rate
-        elif rate < -slow:
-            t = (s.low[c] - value) / rate
-        else:
-            continue
-        t = max(t, 0.0)
-        if t < alpha or (t == alpha and met >= 0 and not careful and abs(rate) > abs(speed)):
-            alpha, met, speed = t, c, rate
-    if met >= 0:
-        s.side[met] = 1 if speed > 0.0 else -1
-    return alpha, met
-
-
-@jit
-def multipliers(s: State, start: int, w: int, count: int, uniform: bool, scale: float) -> float:
-    """u[:w] = λ with gradient -Aᵀr = Σ λ_j c_j over the freedom; returns the smallest pivot of the triangle."""
-    n = s.x.shape[0]
-    pivot = 1.0
-    for j in range(w - 1, -1, -1):
-        value = 0.0
-        if uniform:
-            value = -scale * along(s.G, start + j, s.r, n)
-        else:
-            for a in range(count):
-                value -= s.G[start + j, n + s.chosen[a]] * s.r[a]
-        for l in range(j + 1, w):
-            value -= s.R[j, l] * s.u[l]
-        s.u[j] = value / s.R[j, j]
-        pivot = min(pivot, abs(s.R[j, j]))
-    return pivot
-
-
-@jit
-def wrong_way(s: State, first: int, w: int, count: int, threshold: float, norm: float, careful: bool) -> int:
-    """Working constraint j, or w + index of the chosen row, that pushes the wrong way most; -1 if none does.
-
-    λ must be >= 0 at a lower bound and <= 0 at an upper one; the residual of a row is its multiplier.
-    """
-    n = s.x.shape[0]
-    worst, gone = threshold, -1
-    for j in range(w):
-        wrong = s.u[j] * s.side[s.working[j]]
-        if wrong > worst:
-            gone, worst = j, wrong
-            if careful:
-                return gone
-    for a in range(count):
-        side = s.side[n + first + s.chosen[a]]
-        if side != 2:
-            wrong = norm * s.r[a] * side
-            if wrong > worst:
-                gone, worst = w + a, wrong
-                if careful:
-                    return gone
-    return gone
-
-
 @fuse
-def minimise_level(s: State, level: int, first: int, last: int, start: int, limit: int) -> tuple[int, int]:
+def minimise_level(
+    s: State, level: int, first: int, last: int, start: int, limit: int, mode: int, damping: float
+) -> tuple[int, int]:
     """Minimise the level of rows first..last over the freedom of basis vectors start.. .
 
     Args:
@@ -173,6 +95,8 @@ def minimise_level(s: State, level: int, first: int, last: int, start: int, limi
         last: one past its last row.
         start: basis vectors already used.
         limit: turns allowed.
+        mode: OFF, or what to do with singular values below `damping`, see `own_damping`.
+        damping: the ε of `own_damping`.
 
     Returns:
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
@@ -191,6 +115,9 @@ def minimise_level(s: State, level: int, first: int, last: int, start: int, limi
                 s.G[j, n + a] = image(s.G, j, s.A, first + a)
 
     tolerance = RANK * norm
+    if mode != OFF and inequalities == 0 and not uniform:
+        count = damp(s, mode, first, count, start, damping, tolerance)
+        width = n + m + n
     rank, size, pivot = 0, 0.0, 1.0
     w, turn = np.int64(0), np.int64(0)
     while True:
@@ -201,12 +128,12 @@ def minimise_level(s: State, level: int, first: int, last: int, start: int, limi
         base = start + w
         if uniform:
             rank = n - base
-            size = residuals(s, first, count)
+            size = residuals(s, first, last, count)
             for j in range(rank):
                 s.u[j] = along(s.G, base + j, s.r, n) / scale
         else:
             rank = load_factor(s, start, w, count, tolerance)
-            size = residuals(s, first, count)  # after the pivoting, which permutes the rows
+            size = residuals(s, first, last, count)  # after the pivoting, which permutes the rows
             least_squares(s.F, count, rank, s.diagonal, s.r, s.u)
             unturn(s.F, s.tau, rank, n - base, s.u)
         # go until a constraint is met
@@ -236,9 +163,9 @@ def minimise_level(s: State, level: int, first: int, last: int, start: int, limi
             continue
         if w == 0 and inequalities == 0:
             break
-        size = residuals(s, first, count)
+        size = residuals(s, first, last, count)
         pivot = multipliers(s, start, w, count, uniform, scale)
-        gone = wrong_way(s, first, w, count, ROUNDING * norm * size / pivot, norm, turn > BLAND)
+        gone = wrong_way(s, first, w, count, inequalities, ROUNDING * norm * size / pivot, norm, turn > BLAND)
         if gone < 0:
             break
         if gone < w:

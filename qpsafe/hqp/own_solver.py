@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.hqp import own_hierarchy, own_level, own_linear, own_state
+from qpsafe.hqp import own_damping, own_hierarchy, own_level, own_linear, own_rules, own_state
 from qpsafe.hqp.own_hierarchy import HEADER, run
 from qpsafe.hqp.own_state import workspace
 
@@ -29,14 +29,18 @@ def _read(dimensions: int) -> Any:
 
 _SIGNATURE = types.void(
     types.float64[::1], types.int64[::1], types.int64, types.float64[::1], types.int64[::1],
-    _read(2), _read(1), _read(1), _read(1), _read(1).copy(dtype=types.int64), _read(1), _read(1), types.boolean,
+    _read(2), _read(1), _read(1), _read(1), _read(1).copy(dtype=types.int64), _read(1), _read(1),
+    types.boolean, types.float64,
 )  # fmt: skip
 
 
 def _sources() -> int:
     """Checksum of all the code that goes into the kernel."""
     try:
-        files = (Path(str(module.__file__)) for module in (own_linear, own_state, own_level, own_hierarchy))
+        files = (
+            Path(str(module.__file__))
+            for module in (own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
+        )
         return crc32(b"".join(file.read_bytes() for file in files))
     except OSError:  # installed without sources
         return 0
@@ -49,9 +53,9 @@ def _compile(key: int) -> Callable[..., None]:
     without the key it would go on using what it compiled before another file changed.
     """
 
-    def solve(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard):  # type: ignore[no-untyped-def]
+    def solve(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping):  # type: ignore[no-untyped-def]
         if key >= 0:
-            run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard)
+            run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping)
 
     notice = Timer(1.5, print, ["qpsafe: compiling the solver, once, takes about 10 s ..."], {"file": sys.stderr})
     notice.daemon = True
@@ -88,6 +92,7 @@ def solve_packed(
     box_low: Array,
     box_high: Array,
     hard: bool,
+    damping: float = 0.0,
 ) -> tuple[Array, Index]:
     """Solve levels of `counts` rows each, packed one below the other.
 
@@ -100,6 +105,7 @@ def solve_packed(
         box_low: (n,) lower limits.
         box_high: (n,) upper limits.
         hard: whether the first level are hard rows.
+        damping: singular values below it are damped; 0 for none.
 
     Returns:
         q̇ (n,), and `info` of [`own_hierarchy.run`][qpsafe.hqp.own_hierarchy.run].
@@ -108,19 +114,6 @@ def solve_packed(
     floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)
     x = np.zeros(n)
     info = np.zeros(HEADER + n + A.shape[0], np.int64)
-    _solve(
-        floats,
-        integers,
-        m,
-        x,
-        info,
-        A,
-        low,
-        high,
-        _NO_WEIGHTS if weight is None else weight,
-        ends,
-        box_low,
-        box_high,
-        hard,
-    )
+    weights = _NO_WEIGHTS if weight is None else weight
+    _solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, damping)
     return x, info

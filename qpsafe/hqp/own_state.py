@@ -19,7 +19,7 @@ class State(NamedTuple):
     """Arrays of one solve. Constraint c < n is joint c of the box, constraint n + i is row i; at most m rows a level.
 
     Attributes:
-        A: (rows, n) all rows of all levels.
+        A: (rows, n) all rows of all levels; then the closing identity; then n rows for damping.
         low: (n + rows,) lower bounds of the box, then of the rows.
         high: (n + rows,) upper bounds.
         kept: (n + rows,) values of the rows when their level was left.
@@ -35,6 +35,7 @@ class State(NamedTuple):
         r: (m,) residuals of the chosen rows.
         u: (n + m,) solution in basis coordinates, then multipliers.
         tau: (n,) reflections of F; diagonal: (n,) of L; scratch: (n + m,).
+        reference: (n,) solution without the nearly singular directions, see `own_damping`; flags: (1,) how many.
     """
 
     A: Array
@@ -55,13 +56,15 @@ class State(NamedTuple):
     tau: Array
     diagonal: Array
     scratch: Array
+    reference: Array
+    flags: Index
 
 
 def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
     """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level."""
-    rows += n  # the closing identity
-    floats = rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 2 * n
-    return np.zeros(floats), np.zeros(2 * (n + rows) + n + m, np.int64)
+    rows, m = rows + 2 * n, m + n  # the closing identity, and rows that damping adds
+    floats = rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 3 * n
+    return np.zeros(floats), np.zeros(2 * (n + rows) + n + m + 1, np.int64)
 
 
 @jit
@@ -75,37 +78,40 @@ def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
     F, f = f[: 2 * m * m].reshape(2 * m, m), f[2 * m * m :]
     low, high, kept, f = f[:c], f[c : 2 * c], f[2 * c : 3 * c], f[3 * c :]
     d, u, scratch, f = f[:width], f[width : 2 * width], f[2 * width : 3 * width], f[3 * width :]
-    r, tau, diagonal = f[:m], f[m : m + n], f[m + n : m + 2 * n]
-    kind, side, working, chosen = i[:c], i[c : 2 * c], i[2 * c : 2 * c + n], i[2 * c + n :]
-    return State(A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch)
+    r, tau, diagonal, reference = f[:m], f[m : m + n], f[m + n : m + 2 * n], f[m + 2 * n :]  # the last n
+    kind, side, working, i = i[:c], i[c : 2 * c], i[2 * c : 2 * c + n], i[2 * c + n :]
+    chosen, flags = i[:m], i[m:]
+    return State(
+        A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch, reference, flags
+    )  # fmt: skip
 
 
 @jit
 def load_box(s: State, box_low: Array, box_high: Array) -> int:
-    """Set x, the box and the basis; fixed joints leave the freedom. Returns used columns, -1 for a bad box.
+    """Set the box, the start x and the basis, fixed joints first. Returns how many are fixed, -1 for a bad box.
 
     Every comparison is written so that NaN fails it.
     """
     n = s.x.shape[0]
-    good, fixed = True, False
+    good = True
+    front, back = 0, n
     for i in range(n):
-        s.G[i, i] = 1.0
-        s.kind[i] = FREE
         if box_low[i] <= box_high[i] and box_low[i] < HUGE and box_high[i] > -HUGE:
             s.low[i] = box_low[i] if box_low[i] > -HUGE else -np.inf
             s.high[i] = box_high[i] if box_high[i] < HUGE else np.inf
             s.x[i] = min(max(0.0, s.low[i]), s.high[i])
-            fixed = fixed or s.low[i] == s.high[i]
         else:
             good = False
-    start = np.int64(0)  # a typed zero: a literal would compile everything below twice
-    if fixed and good:
-        for i in range(n):
-            if s.low[i] == s.high[i]:
-                hold(s, n, start, np.int64(0), i)
-                s.kind[i] = LOCKED - 1
-                start += 1
-    return int(start) if good else -1
+            s.x[i] = 0.0
+        if s.low[i] == s.high[i]:
+            s.G[front, i] = 1.0
+            s.kind[i] = LOCKED - 1
+            front += 1
+        else:
+            back -= 1
+            s.G[back, i] = 1.0
+            s.kind[i] = FREE
+    return front if good else -1
 
 
 @jit
@@ -132,7 +138,7 @@ def load_rows(s: State, A: Array, low: Array, high: Array, weight: Array, ends: 
     for i in range(n):
         s.A[rows + i, i] = 1.0
         s.low[n + rows + i] = s.high[n + rows + i] = 0.0
-    return ends.shape[0]
+    return int(ends.shape[0])
 
 
 @jit

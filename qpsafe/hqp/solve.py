@@ -37,6 +37,7 @@ def solve_hierarchy(
     solver: str | None = None,
     *,
     rows: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
+    damping: float = 0.0,
 ) -> Solution:
     """Solve prioritised least squares: each level is minimised among the optima of those before it.
 
@@ -50,6 +51,9 @@ def solve_hierarchy(
         solver: "own" (the default) or "qpsolvers:<name>". Where a back end fails, the own solver answers, and
             `solver` and `note` of the solution say so.
         rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
+        damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
+            A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
+            nothing. 0 means none. Own solver only.
 
     Returns:
         The solution. Bad data never raise: `status` tells, and `qd` is finite and inside the box (a joint whose own
@@ -60,19 +64,23 @@ def solve_hierarchy(
     """
     begin = perf_counter()
     problem = _pack(levels, lower, upper, rows)
+    if not 0.0 <= damping < np.inf:
+        raise ConfigurationError("solve_hierarchy", "damping", damping, "a number >= 0, in the unit of A")
     if solver is None or solver == "own":
-        return _own(problem, begin)
+        return _own(problem, begin, damping)
+    if damping > 0.0:
+        raise ConfigurationError("solve_hierarchy", "damping", damping, f'0 with solver {solver!r}; only "own" damps')
     return _cascade(problem, solver, begin)
 
 
-def _own(problem: Packed, begin: float, note: str = "") -> Solution:
+def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") -> Solution:
     """Solve with the own solver."""
     global _solve_packed
     if _solve_packed is None:  # the first use: it brings numba
         from qpsafe.hqp.own_solver import solve_packed
 
         _solve_packed = solve_packed
-    qd, info = _solve_packed(*problem)
+    qd, info = _solve_packed(*problem, damping)
     code, turns, where = info[:3].tolist()
     status = _STATUS[code]
     if code > 1 and not note:
@@ -93,7 +101,7 @@ def _cascade(problem: Packed, solver: str, begin: float) -> Solution:
         return Solution(start, status, 0, solver, perf_counter() - begin, problem, None, note)
     qd, turns, failures = solve_cascade(backend, levels, start, problem.box_low, problem.box_high)
     if failures:
-        return _own(problem, begin, f"{solver} failed at {_name(problem, failures[0])}, the own solver answered")
+        return _own(problem, begin, note=f"{solver} failed at {_name(problem, failures[0])}, the own solver answered")
     solution = Solution(qd, SOLVED, turns, solver, perf_counter() - begin, problem)
     if problem.hard and levels[0].rows:
         value = levels[0].A @ qd
@@ -139,6 +147,8 @@ def _pack(
     if not matrix.flags.c_contiguous:
         matrix = np.ascontiguousarray(matrix)
     n = matrix.shape[1]
+    if n == 0:
+        raise ConfigurationError("solve_hierarchy", "levels[0].A.shape", matrix.shape, "(rows, n) with n >= 1")
     box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
     box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
     return Packed(matrix, low, high, weight, counts, box_low, box_high, rows is not None)
