@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 
 #: Kinds of limits by their code; 0 stands for none.
-KINDS = ("", "position", "velocity", "acceleration")
+KINDS = ("", "position", "velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Box:
         upper: (n,) [rad/s], >= lower.
         lower_kind: Which limit made `lower`, (n,) codes into `KINDS`.
         upper_kind: Which limit made `upper`, (n,) codes into `KINDS`.
-        sacrificed: Which limit had to give way for the others, (n,) codes into `KINDS`, 0 for none. Position gives way
-            first, then velocity; acceleration always holds.
+        sacrificed: Which limit had to give way for the others, (n,) codes into `KINDS`, 0 for none. Jerk, where it is
+            limited, gives way first, then position, then velocity; acceleration always holds. The gravest is named.
     """
 
     lower: NDArray[np.float64]
@@ -68,6 +68,8 @@ class JointLimits:
         max_acceleration: (n,) [rad/s²], > 0.
         dt: Sample time [s].
         return_speed: Speed at which a joint that starts outside its position limits is brought back [rad/s].
+        max_jerk: (n,) [rad/s³], > 0, or None. Smooths the motion; it is no hard limit, since braking in time for the
+            others comes first.
 
     Raises:
         ConfigurationError: Shapes differ, a number is NaN, lower > upper, or a rate is not positive.
@@ -81,6 +83,7 @@ class JointLimits:
         max_acceleration: ArrayLike,
         dt: float = 0.004,
         return_speed: float = 0.1,
+        max_jerk: ArrayLike | None = None,
     ) -> None:
         self.lower = _numbers("lower", lower)
         self.upper = _numbers("upper", upper)
@@ -88,23 +91,26 @@ class JointLimits:
         self.max_acceleration = _numbers("max_acceleration", max_acceleration)
         self.dt = float(_numbers("dt", dt, 0))
         self.return_speed = float(_numbers("return_speed", return_speed, 0))
+        self.max_jerk = None if max_jerk is None else np.array(max_jerk, dtype=float)
         shape = self.lower.shape
-        for key in ("upper", "max_velocity", "max_acceleration"):
+        rates = ("max_velocity", "max_acceleration") + (() if max_jerk is None else ("max_jerk",))
+        for key in ("upper", *rates):
             if getattr(self, key).shape != shape:
                 raise ConfigurationError("JointLimits", key, getattr(self, key), f"an array of shape {shape}")
         if not (self.lower <= self.upper).all():
             raise ConfigurationError("JointLimits", "lower", self.lower, f"numbers <= upper = {self.upper}")
-        for key in ("max_velocity", "max_acceleration", "dt", "return_speed"):
+        for key in (*rates, "dt", "return_speed"):
             value = np.asarray(getattr(self, key))
             if not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
 
-    def box(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:
+    def box(self, q: NDArray[np.float64], qd: NDArray[np.float64], qdd: NDArray[np.float64] | None = None) -> Box:
         """Admissible velocities for the next tick.
 
         Args:
             q: Commanded joint position (n,) [rad], finite.
             qd: Last commanded joint velocity (n,) [rad/s], finite.
+            qdd: Acceleration that led to it (n,) [rad/s²], for the jerk limit; 0 if None.
 
         Returns:
             A box with lower <= upper, whatever the state.
@@ -113,6 +119,8 @@ class JointLimits:
         kinds = np.zeros((3, len(q)), dtype=np.int64)
         limits = (self.lower, self.upper, self.max_velocity, self.max_acceleration)
         _box(q, qd, *limits, self.dt, self.return_speed, bounds, kinds)
+        if self.max_jerk is not None:
+            _limit_jerk(qd, np.zeros_like(qd) if qdd is None else qdd, self.max_jerk, self.dt, bounds, kinds)
         return Box(bounds[0], bounds[1], kinds[0], kinds[1], kinds[2])
 
 
@@ -180,3 +188,22 @@ def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  #
             sacrificed = max(sacrificed, 1)
         bounds[0, i], bounds[1, i] = lo, hi
         kinds[0, i], kinds[1, i], kinds[2, i] = kind_lo, kind_hi, sacrificed
+
+
+@njit(cache=True)
+def _limit_jerk(qd, qdd, jerk, dt, bounds, kinds):  # type: ignore[no-untyped-def]
+    """Narrow the box to |q̈ - q̈_last| <= jerk dt where that leaves something, else to its nearest point."""
+    for i in range(len(qd)):
+        low, high = qd[i] + (qdd[i] - jerk[i] * dt) * dt, qd[i] + (qdd[i] + jerk[i] * dt) * dt
+        if low > bounds[1, i]:
+            bounds[0, i] = bounds[1, i]
+        elif high < bounds[0, i]:
+            bounds[1, i] = bounds[0, i]
+        else:
+            if low > bounds[0, i]:
+                bounds[0, i], kinds[0, i] = low, 4
+            if high < bounds[1, i]:
+                bounds[1, i], kinds[1, i] = high, 4
+            continue
+        if kinds[2, i] == 0:
+            kinds[2, i] = 4
