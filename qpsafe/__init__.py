@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "Activation": "qpsafe.danger.activation",
     "ConfigurationError": "qpsafe.errors",
+    "DangerBarrier": "qpsafe.danger.barrier",
     "DangerField": "qpsafe.danger.field",
     "Evasion": "qpsafe.danger.evasion",
     "FixedPose": "qpsafe.tasks.trajectory",
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from qpsafe.controller import SafetyController as SafetyController
     from qpsafe.danger.activation import Activation as Activation
     from qpsafe.danger.activation import Threshold as Threshold
+    from qpsafe.danger.barrier import DangerBarrier as DangerBarrier
     from qpsafe.danger.evasion import Evasion as Evasion
     from qpsafe.danger.field import DangerField as DangerField
     from qpsafe.errors import ConfigurationError as ConfigurationError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal, get_args
 
 import numpy as np
@@ -25,24 +26,32 @@ class HierarchicalLaw:
         projection="strict":  [J_1 q̇ = ẋ_1 ≻ ... ≻ J_k q̇ = ẋ_k ≻ min ||q̇ - q̇0||²]
         projection="paper":   [J_1 q̇ = ẋ_1 ≻ min ||q̇ - (Σ_(i>=2) N_(i-1) P(J_i) ẋ_i + N_k q̇0)||²]
 
-    each subject to the same limits, so the blend meets them too and is continuous in the activations. "paper" without
-    active limits equals eqs. (18) and (22). "strict" differs where tasks are not independent of each other: there the
-    error of the lower one still goes to zero whenever it can. Only regimes with weight are solved: one in a pure
-    regime, two in a transition.
+    each under the problem's soft levels, if any, and subject to the same limits, so the blend meets them too and is
+    continuous in the activations. "paper" without active limits equals eqs. (18) and (22). "strict" differs where the
+    rows of two tasks are not orthogonal: there the error of the lower one still goes to zero whenever it can. Only
+    regimes with weight are solved: one in a pure regime, two in a transition.
 
     Args:
         projection: How tasks below the first are treated.
         solver: Solver of `solve_hierarchy`; None for its default.
+        damping: Near singular poses, directions in which a task's Jacobian has a singular value below this pass
+            gradually to the levels below, so that speeds stay bounded without limits too; 0.02 is a good value, 0 (off)
+            is needed for equivalence. Own solver only.
 
     Raises:
-        ConfigurationError: Unknown projection.
+        ConfigurationError: Unknown projection, or a damping that is no finite number >= 0.
     """
 
-    def __init__(self, projection: Projection = "strict", solver: str | None = None) -> None:
+    def __init__(self, projection: Projection = "strict", solver: str | None = None, damping: float = 0.0) -> None:
         if projection not in get_args(Projection):
             raise ConfigurationError("HierarchicalLaw", "projection", projection, f"one of {get_args(Projection)}")
+        if not 0.0 <= damping < math.inf:
+            raise ConfigurationError("HierarchicalLaw", "damping", damping, "a finite number >= 0")
+        if damping > 0.0 and solver not in (None, "own"):
+            raise ConfigurationError("HierarchicalLaw", "damping", damping, f"0 with solver {solver!r}")
         self.projection = projection
         self.solver = solver
+        self.damping = float(damping)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
@@ -62,11 +71,11 @@ class HierarchicalLaw:
         n = len(problem.qd0)
         identity = np.eye(n)
         if self.projection == "strict" or kept < 2:
-            levels = [Level(J, xd, xd) for J, xd in problem.tasks[:kept]]
+            levels = [*problem.soft, *(Level(J, xd, xd) for J, xd in problem.tasks[:kept])]
             levels.append(Level(identity, problem.qd0, problem.qd0))  # E closes every hierarchy
         else:
             J_1, xd_1 = problem.tasks[0]
             # what the source adds below the first task; its part in the range of P(J_1) is overruled by level 1
             target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
-            levels = [Level(J_1, xd_1, xd_1), Level(identity, target, target)]
-        return solve_hierarchy(levels, problem.lower, problem.upper, solver=self.solver)
+            levels = [*problem.soft, Level(J_1, xd_1, xd_1), Level(identity, target, target)]
+        return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=self.damping)

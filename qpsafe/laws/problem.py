@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from qpsafe.hqp.level import Level
     from qpsafe.hqp.solution import Solution
 
 
@@ -33,6 +34,7 @@ class LawProblem(NamedTuple):
         activations: a_1 >= ... >= a_N in [0, 1], one per task (m, m f for two).
         lower: Lowest admissible q̇ (n,), or None without limits.
         upper: Highest admissible q̇ (n,), or None without limits.
+        soft: Inequality levels (barriers) directly under the limits, before the first task; by default none.
     """
 
     tasks: tuple[TaskVelocity, ...]
@@ -40,6 +42,7 @@ class LawProblem(NamedTuple):
     activations: tuple[float, ...]
     lower: NDArray[np.float64] | None = None
     upper: NDArray[np.float64] | None = None
+    soft: tuple[Level, ...] = ()
 
 
 @dataclass(frozen=True)

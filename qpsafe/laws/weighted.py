@@ -41,5 +41,5 @@ class WeightedLaw:
             rows.append(scale * J)
             targets.append(scale * xd)
         A, b = np.vstack(rows), np.concatenate(targets)
-        solution = solve_hierarchy([Level(A, b, b)], problem.lower, problem.upper, solver=self.solver)
+        solution = solve_hierarchy([*problem.soft, Level(A, b, b)], problem.lower, problem.upper, solver=self.solver)
         return LawResult(solution.qd, solution.status, ((1.0, solution),))
