@@ -68,7 +68,7 @@ def test_a_faulty_law_is_reported_and_the_robot_brakes(run: Any, key: str, limit
     loop = run(law, limits=limits)
     loop.stir(12)
     path_time, law.spoilt = loop.controller.recovery.path_time, True
-    tick = loop.settle(60, loop.q, loop.qd, points=[])
+    tick = loop.settle(18, loop.q, loop.qd, points=[])
     assert tick.status == "fault"
     with pytest.raises(AssertionError, match=words):  # the message holds the words
         raise AssertionError(tick.messages[0])
@@ -83,7 +83,7 @@ def test_a_faulty_law_is_reported_and_the_robot_brakes(run: Any, key: str, limit
     assert loop.qd.any()
 
 
-@pytest.mark.parametrize("size", [5.0, 1e3, 1e12, 1e300])
+@pytest.mark.parametrize("size", [5.0, 1e300])
 def test_a_law_beyond_the_limits_is_clipped_and_named(run: Any, size: float) -> None:
     """Every joint is driven against its position limit, at the largest speed and acceleration there is."""
     push = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0]) * size
@@ -91,7 +91,7 @@ def test_a_law_beyond_the_limits_is_clipped_and_named(run: Any, size: float) -> 
     law.spoilt = True
     loop = run(law)
     fastest = np.zeros(N)
-    for _ in range(900):
+    for _ in range(700):
         tick = loop.step()  # `loop` watches
         assert tick.status == "degraded"
         assert "the law exceeded the limits, clipped: joint_1" in tick.messages[-1]
