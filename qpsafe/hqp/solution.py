@@ -122,6 +122,14 @@ class Solution:
         with np.errstate(invalid="ignore", over="ignore"):
             return tuple(float(np.sqrt(v @ v)) for v in self.violations)
 
+    @property
+    def costs(self) -> tuple[float, ...]:
+        """Per level, hard rows first, the root of what is minimised: the norm of the violations with weights."""
+        p = self._problem
+        roots = np.ones(p.low.shape[0]) if p.weight is None else np.sqrt(p.weight)
+        parts = np.split(roots, np.cumsum(p.counts)[:-1])
+        return tuple(float(np.linalg.norm(w * v)) for w, v in zip(parts, self._row_violations, strict=False))
+
     @cached_property
     def binding_joints(self) -> NDArray[np.int8]:
         """(n,) -1 where the joint is at its lower limit, +1 at its upper limit, 2 at both, else 0."""

@@ -48,8 +48,9 @@ def solve_hierarchy(
         levels: `(A, b)` pairs or `Level`s, highest priority first; A is (rows, n).
         lower: (n,) hard lower limits [rad/s], may be infinite; None means none.
         upper: (n,) hard upper limits [rad/s], may be infinite; None means none.
-        solver: "own" (the default) or "qpsolvers:<name>". Where a back end fails, the own solver answers, and
-            `solver` and `note` of the solution say so.
+        solver: "own" (the default), "daqp" (its hierarchical mode) or "qpsolvers:<name>" (one program a level). The own
+            solver judges these: where they fail or a level comes out worse, its answer is returned, and `solver` and
+            `note` of the solution say so.
         rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
         damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
             A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
@@ -57,7 +58,7 @@ def solve_hierarchy(
 
     Returns:
         The solution. Bad data never raise: `status` tells, and `qd` is finite and inside the box (a joint whose own
-        limits are invalid gets 0).
+        limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
 
     Raises:
         ConfigurationError: for shapes that do not fit and unknown solvers.
@@ -70,7 +71,7 @@ def solve_hierarchy(
         return _own(problem, begin, damping)
     if damping > 0.0:
         raise ConfigurationError("solve_hierarchy", "damping", damping, f'0 with solver {solver!r}; only "own" damps')
-    return _cascade(problem, solver, begin)
+    return _by_back_end(problem, solver, begin)
 
 
 def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") -> Solution:
@@ -88,26 +89,43 @@ def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") ->
     return Solution(qd, status, turns, "own", perf_counter() - begin, problem, info[3:], note)
 
 
-def _cascade(problem: Packed, solver: str, begin: float) -> Solution:
-    """Solve level by level with a back end of qpsolvers."""
-    from qpsafe.hqp.cascade import solve_cascade
-
+def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
+    """Solve with somebody else's solver; the own one judges the result, and answers where it fails."""
     backend = _backend(solver)
-    start, box_valid = nearest_to_standstill(problem.box_low, problem.box_high)
-    levels = _unpack(problem)
-    bad = next((k for k, level in enumerate(levels) if not usable(level)), None)
-    if not box_valid or bad is not None:
-        status, note = (INVALID_LIMITS, "") if not box_valid else (INVALID_DATA, _name(problem, bad or 0))
-        return Solution(start, status, 0, solver, perf_counter() - begin, problem, None, note)
-    qd, turns, failures = solve_cascade(backend, levels, start, problem.box_low, problem.box_high)
-    if failures:
-        return _own(problem, begin, note=f"{solver} failed at {_name(problem, failures[0])}, the own solver answered")
-    solution = Solution(qd, SOLVED, turns, solver, perf_counter() - begin, problem)
-    if problem.hard and levels[0].rows:
-        value = levels[0].A @ qd
-        if np.any(np.abs(levels[0].violations(qd)) > 1e-8 * np.maximum(1.0, np.abs(value))):
-            solution.status = ROWS_INFEASIBLE
+    own = _own(problem, begin)
+    if own.status in (INVALID_DATA, INVALID_LIMITS, FAILED):
+        return own
+    levels, box = _unpack(problem), (problem.box_low, problem.box_high)
+    qd: Array | None
+    failures: list[int] = []
+    if backend:
+        from qpsafe.hqp.cascade import solve_cascade
+
+        qd, turns, failures = solve_cascade(backend, levels, np.clip(np.zeros_like(box[0]), *box), *box)
+    else:
+        from qpsafe.hqp.native_daqp import solve_daqp
+
+        qd, turns = solve_daqp(levels, *box, problem.hard)
+    if qd is None or failures:
+        own.note = f"{solver} failed{f' at {_name(problem, failures[0])}' if failures else ''}, the own solver answered"
+        return own
+    solution = Solution(qd, own.status, turns, solver, perf_counter() - begin, problem)
+    worse = _worse_level(solution.costs, own.costs)
+    if worse is not None:
+        own.note = f"{solver} was worse at {_name(problem, worse)}, the own solver answered"
+        return own
     return solution
+
+
+def _worse_level(costs: Sequence[float], judge: Sequence[float]) -> int | None:
+    """The first level at which the costs are lexicographically worse than the judge's, None if they are not."""
+    for k, (theirs, ours) in enumerate(zip(costs, judge, strict=True)):
+        tolerance = 1e-6 * max(1.0, ours)
+        if not theirs <= ours + tolerance:
+            return k
+        if theirs < ours - tolerance:
+            return None
+    return None
 
 
 def _pack(
@@ -183,23 +201,6 @@ def _name(problem: Packed, level: int) -> str:
     return "the hard rows" if level < 0 else f"level {level}"
 
 
-def nearest_to_standstill(lower: Array, upper: Array) -> tuple[Array, bool]:
-    """The point of the box nearest to zero, and whether the box is valid; joints without a valid interval get 0."""
-    valid = (lower <= upper) & (lower < np.inf) & (upper > -np.inf)  # false for NaN
-    start = np.zeros(lower.shape[0])
-    np.clip(start, lower, upper, out=start, where=valid)
-    return start, bool(valid.all())
-
-
-def usable(level: Level) -> bool:
-    """Whether a level holds numbers to compute with: A finite, lower <= upper, weights positive."""
-    ok = np.isfinite(level.A).all() and (level.lower <= level.upper).all()
-    ok = ok and (level.lower < np.inf).all() and (level.upper > -np.inf).all()
-    if level.weight is not None:
-        ok = ok and (level.weight > 0.0).all() and (level.weight < np.inf).all()
-    return bool(ok)
-
-
 def _limit(values: ArrayLike, n: int, name: str) -> Array:
     """(n,) limit, copied."""
     try:
@@ -212,11 +213,13 @@ def _limit(values: ArrayLike, n: int, name: str) -> Array:
 
 
 def _backend(solver: str) -> str:
-    """Name of the qpsolvers back end behind "qpsolvers:<name>"."""
+    """Name of the qpsolvers back end behind "qpsolvers:<name>", empty for "daqp"."""
+    if solver == "daqp":
+        return ""
     import qpsolvers
 
     prefix, _, name = solver.partition(":") if isinstance(solver, str) else ("", "", "")
     if prefix != "qpsolvers" or name not in qpsolvers.available_solvers:
         known = ", ".join(f'"qpsolvers:{name}"' for name in qpsolvers.available_solvers)
-        raise ConfigurationError("solve_hierarchy", "solver", solver, f'"own" or one of {known}')
+        raise ConfigurationError("solve_hierarchy", "solver", solver, f'"own", "daqp" or one of {known}')
     return name
