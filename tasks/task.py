@@ -41,6 +41,9 @@ class Task(ABC):
         self.frame = frame
         self.trajectory = trajectory
         self.gain = float(gain)
+        first, last = self.rows[0], self.rows[-1]
+        contiguous = self.rows == tuple(range(first, last + 1))
+        self._rows = slice(first, last + 1) if contiguous else list(self.rows)  # a slice is the quicker one
 
     @abstractmethod
     def error(self, pose: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
@@ -48,8 +51,8 @@ class Task(ABC):
 
     def jacobian(self, state: RobotState) -> NDArray[np.float64]:
         """Task Jacobian (rows, n): the time derivative of what the task controls."""
-        return state.jacobian(self.frame)[list(self.rows)]
+        return state.jacobian(self.frame)[self._rows]
 
     def velocity(self, error: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """CLIK velocity ẋ = ẋ_d + K e, (rows,)."""
-        return sample.twist[list(self.rows)] + self.gain * error
+        return sample.twist[self._rows] + self.gain * error

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
-from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
@@ -68,14 +69,20 @@ class HierarchicalLaw:
         return LawResult(qd, status, tuple(regimes))
 
     def _solve_regime(self, problem: LawProblem, kept: int) -> Solution:
-        n = len(problem.qd0)
-        identity = np.eye(n)
+        """Solve the hierarchy that keeps the first `kept` tasks; equality levels are (A, b) pairs."""
+        identity = _identity(len(problem.qd0))
         if self.projection == "strict" or kept < 2:
-            levels = [*problem.soft, *(Level(J, xd, xd) for J, xd in problem.tasks[:kept])]
-            levels.append(Level(identity, problem.qd0, problem.qd0))  # E closes every hierarchy
+            levels = [*problem.soft, *problem.tasks[:kept], (identity, problem.qd0)]  # E closes every hierarchy
         else:
             J_1, xd_1 = problem.tasks[0]
             # what the source adds below the first task; its part in the range of P(J_1) is overruled by level 1
             target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
-            levels = [*problem.soft, Level(J_1, xd_1, xd_1), Level(identity, target, target)]
+            levels = [*problem.soft, (J_1, xd_1), (identity, target)]
         return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=self.damping)
+
+
+@functools.lru_cache(maxsize=32)
+def _identity(n: int) -> NDArray[np.float64]:
+    identity = np.eye(n)
+    identity.setflags(write=False)
+    return identity
