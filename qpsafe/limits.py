@@ -55,6 +55,8 @@ class Box:
 
     def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """What was sacrificed, in words, one entry per joint concerned."""
+        if not self.sacrificed.any():
+            return ()
         return tuple(f"{names[i]}: {KINDS[kind]} limit sacrificed" for i, kind in enumerate(self.sacrificed) if kind)
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.compiled import entry, readable
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ def link_vectors(vectors: NDArray[np.float64], links: NDArray[np.int64], n_links
         One vector per link, (n_links, 3); zero where the link saw nothing.
     """
     total = np.zeros((n_links, 3))
-    np.add.at(total, links, vectors)
+    _sum_by_link(vectors, links, total)
     return total
 
 
@@ -43,9 +45,30 @@ def virtual_torque(state: RobotState, forces: NDArray[np.float64]) -> NDArray[np
         σ, (n,).
     """
     starts, stops = state.robot.wire_indices
-    J = state.wire_jacobians()  # linear rows at every end frame
-    # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) superposition: σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
-    return np.einsum("lkn,lk->n", J[starts] + J[stops], forces)
+    torque = np.zeros(len(state.q))
+    _torque(state.wire_jacobians(), starts, stops, forces, torque)
+    return torque
+
+
+_links = types.Array(types.int64, 1, "A", readonly=True)
+
+
+@entry(types.void(readable(2), _links, types.float64[:, ::1]))
+def _sum_by_link(vectors, links, total):  # type: ignore[no-untyped-def]
+    for k in range(len(links)):  # (8)
+        for c in range(3):
+            total[links[k], c] += vectors[k, c]
+
+
+@entry(types.void(readable(3), _links, _links, readable(2), types.float64[::1]))
+def _torque(J, starts, stops, forces, torque):  # type: ignore[no-untyped-def]
+    for i in range(len(starts)):
+        for c in range(3):
+            force = forces[i, c]
+            if force != 0.0:
+                for j in range(len(torque)):
+                    # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
+                    torque[j] += (J[starts[i], c, j] + J[stops[i], c, j]) * force
 
 
 class Evasion:
