@@ -90,7 +90,7 @@ def as_levels(levels: Iterable[Level | Sequence[Any]]) -> list[Level]:
     """
     result: list[Level] = []
     for k, item in enumerate(levels):
-        if isinstance(item, Level):
+        if type(item) is Level or isinstance(item, Level):
             level = item
         elif isinstance(item, (tuple, list)) and len(item) == 2:
             level = Level(item[0], item[1], item[1])

@@ -13,6 +13,8 @@ recursive LDLᵀ updates", IEEE TAC 67(8), 2022.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import daqp
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,35 @@ def solve_daqp(levels: list[Level], lower: Array, upper: Array, hard: bool) -> t
     Returns:
         q̇ (n,), clipped to the box by rounding only, or None if DAQP did not find one; and its iterations.
     """
+    return call_daqp(arrange(levels, lower, upper, hard), lower, upper)
+
+
+class Arranged(NamedTuple):
+    """Arguments of `daqp.solve`; the last row of each level is in `ends`, counted with the box."""
+
+    H: Array
+    f: Array
+    A: Array
+    upper: Array
+    lower: Array
+    sense: NDArray[np.int32]
+    ends: NDArray[np.int32]
+
+
+def call_daqp(arranged: Arranged, lower: Array, upper: Array) -> tuple[Array | None, int]:
+    """Let DAQP solve; see `solve_daqp`."""
+    *arguments, ends = arranged
+    if not arranged.A.size:  # nothing but the box
+        return np.clip(-arranged.f, lower, upper), 0
+    x, _, flag, info = daqp.solve(*arguments, break_points=ends, rho_soft=1e-8, primal_tol=1e-9)
+    clipped = np.clip(x, lower, upper)
+    if flag not in _FOUND or not np.all(np.abs(clipped - x) <= 1e-8):
+        return None, int(info["iterations"])
+    return clipped, int(info["iterations"])
+
+
+def arrange(levels: list[Level], lower: Array, upper: Array, hard: bool) -> Arranged:
+    """Lay a hierarchy out for DAQP."""
     n = lower.shape[0]
     target = np.zeros(n)
     stack = list(levels)
@@ -52,24 +83,9 @@ def solve_daqp(levels: list[Level], lower: Array, upper: Array, hard: bool) -> t
             ends[0] += low.size
         elif low.size:
             ends.append(ends[-1] + low.size)
-    A, low, high = np.vstack(matrices), np.concatenate(lows), np.concatenate(highs)
-    if low.size == n and not A.size:
-        return np.clip(target, lower, upper), 0
-    x, _, flag, info = daqp.solve(
-        np.eye(n),
-        -target,
-        A,
-        np.minimum(high, 1e30),
-        np.maximum(low, -1e30),
-        np.zeros(low.size, dtype=np.int32),
-        break_points=np.array(ends, dtype=np.int32),
-        rho_soft=1e-8,
-        primal_tol=1e-9,
-    )
-    clipped = np.clip(x, lower, upper)
-    if flag not in _FOUND or not np.all(np.abs(clipped - x) <= 1e-8):
-        return None, int(info["iterations"])
-    return clipped, int(info["iterations"])
+    low, high = np.maximum(np.concatenate(lows), -1e30), np.minimum(np.concatenate(highs), 1e30)
+    sense, last_rows = np.zeros(low.size, dtype=np.int32), np.array(ends, dtype=np.int32)
+    return Arranged(np.eye(n), -target, np.vstack(matrices), high, low, sense, last_rows)
 
 
 def prepared(level: Level) -> tuple[Array, Array, Array]:

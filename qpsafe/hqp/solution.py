@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from qpsafe.hqp.packing import Packed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -31,30 +31,6 @@ MEANING = {
 }
 
 _TOUCH = 1e-9  # [rad/s] a limit nearer than this (relative above 1) is reported as binding
-
-
-class Packed(NamedTuple):
-    """A problem in arrays; the first level are the hard rows if `hard`.
-
-    Attributes:
-        A: (rows, n) rows of all levels.
-        low: (rows,) their lower bounds.
-        high: (rows,) their upper bounds.
-        weight: (rows,) their weights, or None for equal ones.
-        counts: rows of each level.
-        box_low: (n,) lower limits, may be -inf.
-        box_high: (n,) upper limits, may be +inf.
-        hard: whether the first level are hard rows.
-    """
-
-    A: Array
-    low: Array
-    high: Array
-    weight: Array | None
-    counts: Sequence[int]
-    box_low: Array
-    box_high: Array
-    hard: bool
 
 
 class Solution:

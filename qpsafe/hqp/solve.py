@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.hqp.level import Level, as_levels
+from qpsafe.hqp.level import Level
+from qpsafe.hqp.packing import Packed, pack, unpack
 from qpsafe.hqp.solution import (
     FAILED,
     INEXACT,
@@ -19,13 +20,11 @@ from qpsafe.hqp.solution import (
     ROWS_INFEASIBLE,
     SOLVED,
     STOPPED,
-    Packed,
     Solution,
 )
 
 Array = NDArray[np.float64]
 
-_FLOAT = np.dtype(np.float64)
 _STATUS = (SOLVED, ROWS_INFEASIBLE, STOPPED, INVALID_DATA, INVALID_LIMITS, INEXACT, FAILED)  # codes of own_hierarchy
 _solve_packed: Callable[..., tuple[Array, NDArray[np.int64]]] | None = None
 
@@ -64,7 +63,7 @@ def solve_hierarchy(
         ConfigurationError: for shapes that do not fit and unknown solvers.
     """
     begin = perf_counter()
-    problem = _pack(levels, lower, upper, rows)
+    problem = pack(levels, lower, upper, rows)
     if not 0.0 <= damping < np.inf:
         raise ConfigurationError("solve_hierarchy", "damping", damping, "a number >= 0, in the unit of A")
     if solver is None or solver == "own":
@@ -95,7 +94,7 @@ def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
     own = _own(problem, begin)
     if own.status in (INVALID_DATA, INVALID_LIMITS, FAILED):
         return own
-    levels, box = _unpack(problem), (problem.box_low, problem.box_high)
+    levels, box = unpack(problem), (problem.box_low, problem.box_high)
     qd: Array | None
     failures: list[int] = []
     if backend:
@@ -128,88 +127,12 @@ def _worse_level(costs: Sequence[float], judge: Sequence[float]) -> int | None:
     return None
 
 
-def _pack(
-    levels: Iterable[Level | Sequence[Any]],
-    lower: ArrayLike | None,
-    upper: ArrayLike | None,
-    rows: tuple[ArrayLike, ArrayLike, ArrayLike] | None,
-) -> Packed:
-    """Copy the problem into arrays: whole lists at once where all is plain, through `as_levels` where it is not."""
-    if type(levels) is not list:
-        levels = list(levels)
-    if rows is not None:
-        levels = [Level(*rows), *as_levels(levels)]
-    if not levels:
-        return _without_levels(lower, upper)
-    matrices: Sequence[Array]
-    try:
-        matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]  # plain pairs (A, b)
-        matrix, low = np.concatenate(matrices), np.concatenate(lows)
-        counts = list(map(len, matrices))
-        plain = matrix.dtype is low.dtype is _FLOAT and counts == list(map(len, lows))
-        plain = plain and matrix.ndim == 2 and low.ndim == 1
-    except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
-        plain = False
-    weight = None
-    if plain:
-        high = low
-    else:
-        stack = as_levels(levels)
-        counts = [level.A.shape[0] for level in stack]
-        matrix = np.concatenate([level.A for level in stack])
-        low = high = np.concatenate([level.lower for level in stack])
-        if any(level.lower is not level.upper for level in stack):
-            high = np.concatenate([level.upper for level in stack])
-        if any(level.weight is not None for level in stack):
-            weight = np.concatenate([np.ones(len(x.A)) if x.weight is None else x.weight for x in stack])
-    if not matrix.flags.c_contiguous:
-        matrix = np.ascontiguousarray(matrix)
-    n = matrix.shape[1]
-    if n == 0:
-        raise ConfigurationError("solve_hierarchy", "levels[0].A.shape", matrix.shape, "(rows, n) with n >= 1")
-    box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
-    box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
-    return Packed(matrix, low, high, weight, counts, box_low, box_high, rows is not None)
-
-
-def _without_levels(lower: ArrayLike | None, upper: ArrayLike | None) -> Packed:
-    """A problem of limits alone."""
-    n = int(np.size(np.asarray(upper if lower is None else lower)))
-    if lower is None and upper is None:
-        raise ConfigurationError("solve_hierarchy", "levels", [], "at least one level or one limit")
-    box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
-    box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
-    return Packed(np.empty((0, n)), np.empty(0), np.empty(0), None, [], box_low, box_high, False)
-
-
-def _unpack(problem: Packed) -> list[Level]:
-    """The levels of a packed problem, hard rows first."""
-    levels, first = [], 0
-    for count in problem.counts:
-        part = slice(first, first + count)
-        weight = None if problem.weight is None else problem.weight[part]
-        levels.append(Level(problem.A[part], problem.low[part], problem.high[part], weight))
-        first += count
-    return levels
-
-
 def _name(problem: Packed, level: int) -> str:
     """What a person calls a level of a packed problem."""
     level -= problem.hard
     if level == len(problem.counts) - problem.hard:
         return "the closing smallest norm"
     return "the hard rows" if level < 0 else f"level {level}"
-
-
-def _limit(values: ArrayLike, n: int, name: str) -> Array:
-    """(n,) limit, copied."""
-    try:
-        limit = np.array(values, _FLOAT)
-    except (TypeError, ValueError):
-        raise ConfigurationError("solve_hierarchy", name, values, f"{n} numbers [rad/s]") from None
-    if limit.shape != (n,):
-        raise ConfigurationError("solve_hierarchy", f"{name}.shape", limit.shape, f"({n},)")
-    return limit
 
 
 def _backend(solver: str) -> str:

@@ -1,4 +1,4 @@
-"""The cascade through qpsolvers: agreement with the own solver where it answers, and the fallback where it does not."""
+"""The back ends: agreement with the own solver where they answer, and the fallback where they do not."""
 
 from __future__ import annotations
 
@@ -27,12 +27,14 @@ def problems(count):
         yield levels, -rng.uniform(0.1, 1.0, n), rng.uniform(0.1, 1.0, n)
 
 
-@pytest.mark.parametrize(("backend", "tolerance"), [("daqp", 1e-5), ("proxqp", 1e-3)])
-def test_agrees_with_the_own_solver(backend, tolerance):
+@pytest.mark.parametrize(
+    ("solver", "tolerance"), [("daqp", 1e-6), ("qpsolvers:daqp", 1e-5), ("qpsolvers:proxqp", 1e-3)]
+)
+def test_agrees_with_the_own_solver(solver, tolerance):
     for levels, lower, upper in problems(80):
         own, other = (
             solve_hierarchy(levels, lower, upper),
-            solve_hierarchy(levels, lower, upper, f"qpsolvers:{backend}"),
+            solve_hierarchy(levels, lower, upper, solver),
         )
         assert other.status == "solved"
         assert np.all(other.qd >= lower)

@@ -1,0 +1,128 @@
+"""A hierarchy copied into arrays, one level below the other: what the solvers work on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.hqp.level import Level, as_levels
+
+Array = NDArray[np.float64]
+
+_FLOAT = np.dtype(np.float64)
+
+
+class Packed(NamedTuple):
+    """A problem in arrays; the first level are the hard rows if `hard`.
+
+    Attributes:
+        A: (rows, n) rows of all levels.
+        low: (rows,) their lower bounds.
+        high: (rows,) their upper bounds.
+        weight: (rows,) their weights, or None for equal ones.
+        counts: rows of each level.
+        box_low: (n,) lower limits, may be -inf.
+        box_high: (n,) upper limits, may be +inf.
+        hard: whether the first level are hard rows.
+    """
+
+    A: Array
+    low: Array
+    high: Array
+    weight: Array | None
+    counts: Sequence[int]
+    box_low: Array
+    box_high: Array
+    hard: bool
+
+
+def pack(
+    levels: Iterable[Level | Sequence[Any]],
+    lower: ArrayLike | None,
+    upper: ArrayLike | None,
+    rows: tuple[ArrayLike, ArrayLike, ArrayLike] | None,
+) -> Packed:
+    """Copy the problem into arrays: whole lists at once where all is plain, through `as_levels` where it is not."""
+    if type(levels) is not list:
+        levels = list(levels)
+    if rows is not None:
+        levels = [Level(*rows), *as_levels(levels)]
+    if not levels:
+        return _without_levels(lower, upper)
+    plain, weight = False, None
+    if type(levels[0]) is not Level:  # pairs (A, b), perhaps
+        try:
+            matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]
+            matrix, low = np.concatenate(matrices), np.concatenate(lows)
+            counts = list(map(len, matrices))
+            plain = matrix.dtype is low.dtype is _FLOAT and counts == list(map(len, lows))
+            plain = plain and matrix.ndim == 2 and low.ndim == 1
+        except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
+            pass
+    if plain:
+        high = low
+    else:
+        matrix, low, high, weight, counts = _stack(as_levels(levels))
+    if not matrix.flags.c_contiguous:
+        matrix = np.ascontiguousarray(matrix)
+    n = matrix.shape[1]
+    if n == 0:
+        raise ConfigurationError("solve_hierarchy", "levels[0].A.shape", matrix.shape, "(rows, n) with n >= 1")
+    box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
+    box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
+    # what Packed(...) does, without its detour through Python
+    return tuple.__new__(Packed, (matrix, low, high, weight, counts, box_low, box_high, rows is not None))
+
+
+def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, list[int]]:
+    """Matrix, bounds, weights (None if nobody has any) and number of rows of a list of levels."""
+    matrices, lows, highs, counts = [], [], [], []
+    equal = plain = True
+    for level in levels:
+        matrices.append(level.A)
+        lows.append(level.lower)
+        highs.append(level.upper)
+        counts.append(level.A.shape[0])
+        equal = equal and level.lower is level.upper
+        plain = plain and level.weight is None
+    low = np.concatenate(lows)
+    weight = None
+    if not plain:
+        weight = np.concatenate([np.ones(len(x.A)) if x.weight is None else x.weight for x in levels])
+    return np.concatenate(matrices), low, low if equal else np.concatenate(highs), weight, counts
+
+
+def _without_levels(lower: ArrayLike | None, upper: ArrayLike | None) -> Packed:
+    """A problem of limits alone."""
+    n = int(np.size(np.asarray(upper if lower is None else lower)))
+    if lower is None and upper is None:
+        raise ConfigurationError("solve_hierarchy", "levels", [], "at least one level or one limit")
+    box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
+    box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
+    return Packed(np.empty((0, n)), np.empty(0), np.empty(0), None, [], box_low, box_high, False)
+
+
+def unpack(problem: Packed) -> list[Level]:
+    """The levels of a packed problem, hard rows first."""
+    levels, first = [], 0
+    for count in problem.counts:
+        part = slice(first, first + count)
+        weight = None if problem.weight is None else problem.weight[part]
+        levels.append(Level(problem.A[part], problem.low[part], problem.high[part], weight))
+        first += count
+    return levels
+
+
+def _limit(values: ArrayLike, n: int, name: str) -> Array:
+    """(n,) limit, copied."""
+    try:
+        limit = np.array(values, _FLOAT)
+    except (TypeError, ValueError):
+        raise ConfigurationError("solve_hierarchy", name, values, f"{n} numbers [rad/s]") from None
+    if limit.shape != (n,):
+        raise ConfigurationError("solve_hierarchy", f"{name}.shape", limit.shape, f"({n},)")
+    return limit
