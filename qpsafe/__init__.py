@@ -23,17 +23,20 @@ _PUBLIC = {
     "JointReference": "qpsafe.reference",
     "Level": "qpsafe.hqp.level",
     "NullspaceLaw": "qpsafe.laws.nullspace",
+    "Obstacle": "qpsafe.sensing.hulls",
     "OrientationTask": "qpsafe.tasks.orientation",
     "PositionTask": "qpsafe.tasks.position",
     "QpsafeError": "qpsafe.errors",
     "RobotFileError": "qpsafe.errors",
     "SafetyController": "qpsafe.controller",
+    "SensingRules": "qpsafe.sensing.rules",
     "SpotArray": "qpsafe.sensing.spots",
     "Threshold": "qpsafe.danger.activation",
     "Tick": "qpsafe.tick",
     "WeightedLaw": "qpsafe.laws.weighted",
     "Wire": "qpsafe.robot.wire",
     "bundled_robots": "qpsafe.robot.loader",
+    "load_converter": "qpsafe.sensing.calibration",
     "load_robot": "qpsafe.robot.loader",
     "load_spots": "qpsafe.sensing.spots",
     "nullspace_velocity": "qpsafe.laws.nullspace",
@@ -63,6 +66,9 @@ if TYPE_CHECKING:
     from qpsafe.robot.loader import bundled_robots as bundled_robots
     from qpsafe.robot.loader import load_robot as load_robot
     from qpsafe.robot.wire import Wire as Wire
+    from qpsafe.sensing.calibration import load_converter as load_converter
+    from qpsafe.sensing.hulls import Obstacle as Obstacle
+    from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
     from qpsafe.sensing.spots import load_spots as load_spots
     from qpsafe.tasks.orientation import OrientationTask as OrientationTask

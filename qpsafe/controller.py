@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.checks import check_arguments, check_parts, checked_spots, checked_velocity, default_activation
 from qpsafe.danger.activation import Activation
+from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.errors import ConfigurationError
@@ -20,8 +21,11 @@ from qpsafe.limits import Box, JointLimits
 from qpsafe.recovery import Recovery
 from qpsafe.reference import JointReference
 from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
-from qpsafe.sensing.hold import PointHold
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.speed_cap import slowed
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
@@ -46,7 +50,9 @@ class SafetyController:
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; None switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
-        hold_time: How long a point still counts after its spot lost it [s].
+        sensing: What counts as danger, and what sick sensors do.
+        known: Known obstacles of the surroundings: points on them are no danger.
+        barrier: A cap on the danger field, beyond the source; none by default.
 
     Raises:
         ConfigurationError: Names the argument that is wrong.
@@ -64,7 +70,9 @@ class SafetyController:
         evasion: Evasion | None = None,
         limits: JointLimits | str | None = "robot",
         spots: SpotArray | None = None,
-        hold_time: float = 0.3,
+        sensing: SensingRules | None = None,
+        known: Sequence[Obstacle] = (),
+        barrier: DangerBarrier | None = None,
     ) -> None:
         check_arguments(robot, tasks, law, dt)
         check_parts(robot, dt, field, activation, evasion, limits)
@@ -82,30 +90,45 @@ class SafetyController:
         self.limits = own if isinstance(limits, str) else limits
         self._brake_limits = self.limits or own
         self.spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
-        self._hold = PointHold(hold_time, self.dt)
+        self.rules = SensingRules() if sensing is None else sensing
+        self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known) if self.spots else None
+        self.barrier = barrier
         self.reset()
 
     def reset(self) -> None:
         """Start anew: the next valid measurement sets the commanded configuration."""
         self.recovery = Recovery(self.tasks, self.activation.suspend_above, self.dt)
         self.evasion.reset()
-        self._hold.reset()
+        if self.sensing is not None:
+            self.sensing.reset()
         self._seq = -1
         self._active = False
         self._q = self.robot.home.copy()
         self._qd = np.zeros(self.robot.nq)
 
+    def acknowledge(self) -> None:
+        """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
+        if self.sensing is not None:
+            self.sensing.acknowledge()
+
     def step(
-        self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None = None, *, points: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        distances: ArrayLike | None = None,
+        *,
+        points: ArrayLike | None = None,
+        ages: ArrayLike | None = None,
     ) -> Tick:
         """One tick. Never raises on data: what cannot be used is reported, and the robot brakes and holds.
 
         Args:
             q: Measured joint position (n,) [rad].
             qd: Measured joint velocity (n,) [rad/s].
-            distances: Reading of every spot (k,) [m]; beyond its range, +inf included, it sees nothing. An array (p, 3)
-                is taken as `points`.
+            distances: Reading of every spot (k,) [m]; beyond its range, +inf included, it sees nothing; NaN, -inf and
+                what is below zero are sick. An array (p, 3) is taken as `points`.
             points: Detected points (p, 3) instead, world frame [m]; each belongs to the wire link nearest to it.
+            ages: How old the distances are, (k,) or one number [s]; fresh by default.
 
         Returns:
             The tick, with the joint reference to send.
@@ -114,28 +137,37 @@ class SafetyController:
         self._seq += 1
         clocks = self.recovery.clocks
         try:
-            tick = self._step(q, qd, distances, points)
+            tick = self._step(q, qd, distances, points, ages)
         except BadInput as problem:
             tick = self._brake(BAD_INPUT, str(problem))
         except Exception as error:  # the loop must go on: report, brake, hold; the path waits for the robot
             self.recovery.clocks = clocks
             tick = self._brake(FAULT, f"{type(error).__name__}: {error}")
+        if self.sensing is not None:
+            tick.severity, tick.unseen = self.sensing.health.severity, self.sensing.unseen
         tick.solve_time = time.perf_counter() - start
         return tick
 
-    def _step(self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None) -> Tick:
+    def _step(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        distances: ArrayLike | None,
+        points: ArrayLike | None,
+        ages: ArrayLike | None,
+    ) -> Tick:
         q = as_joint_position(q, self.robot)
         qd = as_joint_velocity(qd, self.robot)
         if not self._active:  # the commanded configuration starts where the robot is
             self._q, self._qd, self._active = q.copy(), np.zeros(self.robot.nq), True
 
-        # spot distances -> detected points (7)
+        # spot distances -> detected points (7), without known obstacles and the robot itself, lost ones held
         measured = self.robot.at(q)
         wire = measured.wire(qd)
-        seen = as_detection(measured, wire, self.spots, self._hold, distances, points)
+        seen = as_detection(measured, wire, self.sensing, distances, points, ages)
 
         # danger (1)-(6); its vectors summed per link (8), as virtual torque (14), (15), as evasive velocity (16)
-        danger, gradient = self.field.evaluate(seen.points, wire)
+        danger, gradient = self.field.evaluate(seen.points, wire, seen.velocities)
         vectors = danger_vectors(danger, gradient)
         cdf_n = float(danger.max(initial=0.0))  # L∞ norm over the points
         torque = virtual_torque(measured, link_vectors(vectors, seen.links, len(self.robot.wire_frames)))
@@ -152,13 +184,22 @@ class SafetyController:
             error = task.error(commanded.pose(task.frame), sample)
             tasks.append(TaskVelocity(task.jacobian(commanded), task.velocity(error, sample)))
 
-        # tasks + q̇0 + activations + limits -> law -> q̇, checked
+        # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         box = self.limits.box(self._q, self._qd) if self.limits else None
         bounds = (box.lower.copy(), box.upper.copy()) if box else (None, None)
-        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, *bounds))
+        barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
+        soft = (barrier,) if barrier else ()
+        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, *bounds, soft))
         status, messages, command = self._inside(checked_velocity(result, self._q, self.dt), box)
         if result.status != "solved":
             status, messages = DEGRADED, (*messages, f"law: {result.status}")
+        if seen.notes:
+            status, messages = DEGRADED, (*messages, *seen.notes)
+        if self.barrier:  # exact, as far as the acceleration limits allow
+            command = self.barrier.scale(measured, command, seen.points).factor * command
+            command = box.clip(command) if box else command
+        if seen.capped:  # a sector is unseen
+            command = slowed(command, commanded, self.rules.speed_cap, box)
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
         regime, switches = self.activation.regime(cdf_n), self.activation.switches(cdf_n)

@@ -48,6 +48,8 @@ class Tick:
         path_time: Clock of the tasks' trajectories [s].
         box: Admissible joint velocities of this tick; None without limits.
         law: What the law answered, with the solution of every regime; None if it was not asked.
+        severity: Of sick sensors, until acknowledged: ``clear``, ``capped`` (speed) or ``stopped``.
+        unseen: Names of the spots that cannot be trusted now: nobody knows what is in front of them.
         joint_names: (n,) names used in reports.
     """
 
@@ -69,6 +71,8 @@ class Tick:
     path_time: float = 0.0
     box: Box | None = None
     law: LawResult | None = None
+    severity: str = "clear"
+    unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
 
     @property

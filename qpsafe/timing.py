@@ -15,6 +15,10 @@ from qpsafe.controller import SafetyController
 from qpsafe.danger.field import DangerField
 from qpsafe.laws.problem import Law
 from qpsafe.robot.loader import load_robot
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.spots import load_spots
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.trajectory import FixedPose
@@ -62,11 +66,34 @@ def time_danger_field(runs: int, progress: Callable[[], None] | None = None) -> 
     return time_calls(lambda _: field.evaluate(points, wire), runs, progress=progress)
 
 
-def time_ticks(law: Law, runs: int, progress: Callable[[], None] | None = None) -> Times:
+def time_sensing(runs: int, progress: Callable[[], None] | None = None) -> Times:
+    """From 20 readings to the points that count: the IRB 140 with a known floor and table, all filters on.
+
+    The readings sweep slowly, with noise; two spots are sick now and then. The kinematics of the tick are not included.
+    """
+    robot, rng = load_robot("irb140"), np.random.default_rng(0)
+    spots = load_spots(robot)
+    assert spots is not None
+    known = (Obstacle.box("floor", (6, 6, 0.5), (0, 0, -0.8)), Obstacle.box("table", (0.6, 1.0, 0.05), (0.8, 0, 0.3)))
+    sensing = DistanceSensing(robot, spots, 0.004, SensingRules(velocities=True), known)
+    state, wire = robot.at(robot.home), robot.wire(robot.home, np.zeros(6))
+    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(500) / 500.0)
+    readings = sweep[:, None] + rng.normal(0.0, 0.003, (500, len(spots)))
+    readings[::50, :2] = np.nan
+    return time_calls(lambda k: sensing.update(state, wire, readings[k % 500]), runs, progress=progress)
+
+
+def time_ticks(law: Law, runs: int, progress: Callable[[], None] | None = None, *, points: bool = False) -> Times:
     """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through all regimes.
 
-    The distances sweep slowly from 0.78 m to 0.3 m and back, so that every regime and transition occurs; the robot
+    The distances sweep slowly from 0.76 m to 0.32 m and back, so that every regime and transition occurs; the robot
     follows its references exactly.
+
+    Args:
+        law: The law.
+        runs: Number of ticks.
+        progress: Called after every tick.
+        points: Give the detected points themselves: everything but what is done to raw sensor readings.
     """
     robot = load_robot("irb140")
     target = FixedPose(robot.pose("tcp", robot.home))
@@ -74,10 +101,14 @@ def time_ticks(law: Law, runs: int, progress: Callable[[], None] | None = None) 
     state = {"q": robot.home, "qd": np.zeros(6)}
     count = len(controller.spots) if controller.spots is not None else 0
     offsets = np.random.default_rng(1).uniform(-0.02, 0.02, count)
+    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
+    home = robot.at(robot.home)
+    around = [controller.spots.points(home, d + offsets) for d in sweep] if controller.spots is not None else []
 
     def tick(k: int) -> None:
-        distances = 0.54 + 0.22 * np.cos(2.0 * np.pi * k / 2500.0) + offsets
-        reference = controller.step(state["q"], state["qd"], distances).reference
+        distances = sweep[k % len(sweep)] + offsets
+        detections = around[k % len(around)] if points else distances
+        reference = controller.step(state["q"], state["qd"], detections).reference
         state["q"], state["qd"] = reference.q, reference.qd
 
     return time_calls(tick, runs, progress=progress)

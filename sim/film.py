@@ -30,7 +30,7 @@ class ViewerUnavailableError(QpsafeError, RuntimeError):
 def overlay(tick: Tick, plant: Plant, spots: SpotArray, thresholds: tuple[float, float]) -> DangerOverlay:
     """What to draw for one tick: all rays, the points that count and their danger vectors."""
     origins, directions = spots.rays(plant.scene.robot.at(plant.q))
-    ends = origins + spots.range_max * directions
+    ends = origins + spots.range_max[:, None] * directions
     # a ray hits where it passes through a detected point
     hits = np.zeros(len(spots), dtype=bool)
     for point in tick.points:

@@ -10,22 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.controller import SafetyController
 from qpsafe.laws.problem import Law
 from qpsafe.sim.choreography import Choreography
 from qpsafe.sim.distance import board_distance, person_distance
 from qpsafe.sim.log import Recorder, RunLog
+from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.plant import Plant
-from qpsafe.sim.rays import cast
 from qpsafe.sim.scene import Scene, build_scene
-from qpsafe.tasks.orientation import OrientationTask
-from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.rotation import euler_zyx, log3
-from qpsafe.tasks.trajectory import FixedPose
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
+    from qpsafe.sensing.rules import SensingRules
 
 Observer = Callable[[Tick, Scene, Plant], None]
 
@@ -41,6 +38,9 @@ class FixedExperiment:
         lag: Control lag of the plant [s].
         limits: Whether the joint limits are on.
         duration: Length [s].
+        sensor: ``ideal`` distances, or those of ``sharp`` sensors.
+        rules: What counts as danger, and what sick sensors do; None for the controller's default.
+        cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it.
     """
 
@@ -50,6 +50,9 @@ class FixedExperiment:
     lag: float = 0.0
     limits: bool = True
     duration: float = 60.0
+    sensor: str = "ideal"
+    rules: SensingRules | None = None
+    cap: float | None = None
     choreography: Choreography = field(default_factory=Choreography)
 
     @cached_property
@@ -71,23 +74,12 @@ class FixedExperiment:
         Raises:
             SimulationFailedError: MuJoCo reported bad values.
         """
-        robot, walk, scene = self.robot, self.walk, self.scene
-        plant = Plant(scene, lag=self.lag)
-        target = FixedPose(robot.pose("tcp", robot.home))
-        tasks = [PositionTask("tcp", target), OrientationTask("tcp", target)]
-        controller = SafetyController(robot, tasks, self.law, limits="robot" if self.limits else None)
-        spots = controller.spots
-        assert spots is not None
-        recorder = Recorder(controller.dt, spots.names)
-        for k in range(round(self.duration / controller.dt)):
-            scene.place_person(plant.data, walk.pose(k * controller.dt))
-            q, qd = plant.q, plant.qd
-            state = robot.at(q)
-            distances = cast(scene, plant.data, *spots.rays(state), cutoff=spots.range_max)
-            tick = controller.step(q, qd, distances)
-            reference = tick.reference
-            # reference.q holds at the end of this period: the servo is told where it starts from
-            plant.apply(reference.q - controller.dt * reference.qd, reference.qd)
+        robot, scene, loop = self.robot, self.scene, FixedLoop(self)
+        controller, plant, target = loop.controller, loop.plant, loop.target
+        assert controller.spots is not None
+        recorder = Recorder(controller.dt, controller.spots.names)
+        for _ in range(round(self.duration / controller.dt)):
+            tick, q, qd, distances, state = loop.step()
             pose = state.pose("tcp")
             recorder.add(
                 tick,
@@ -95,12 +87,12 @@ class FixedExperiment:
                 qd,
                 distances,
                 pose_error(pose, target.pose),
-                euler_error(robot.pose("tcp", reference.q), target.pose),
+                euler_error(robot.pose("tcp", tick.reference.q), target.pose),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
             )
             if observer is not None:
                 observer(tick, scene, plant)
-            plant.advance()
+            loop.advance()
         return recorder.finish()
 
     def board_distance_without_controller(self) -> NDArray[np.float64]:

@@ -1,55 +1,120 @@
-"""Rays of the distance sensors against the person and the board.
+"""Rays of the distance sensors against everything: person, board, floor, pedestal and the robot itself.
 
-Only geometry group 1 is seen. The robot and the floor are transparent here: the source removes measurements of the
-robot itself and of known surroundings in software, which is a filter of its own, not a property of the ray.
+A spot's own body is left out: it cannot see what it is mounted on. What of the rest does not count is decided by
+the controller's filters, as in the source, not by the rays.
 
-One `mj_ray` call a ray: for 20 rays that takes tens of microseconds, and it reads the poses that the plant and
-`Scene.place_person` have just computed. `mujoco.batch.Batch.ray` casts thousands faster, but redoes the kinematics of a
-state handed to it at every call.
+One `mj_multiRay` call a spot: the rays of its cone start at one point. The poses that the plant and
+`Scene.place_person` have just computed are read; `mujoco.batch.Batch.ray` casts thousands faster, but redoes the
+kinematics of a state handed to it at every call.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.scene import PERSON, Scene
+from qpsafe.sim.scene import PERSON, ROBOT_COLLISION, SCENERY, Scene
 
-_SEEN = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
-_SEEN[PERSON] = 1
+if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
+    from qpsafe.sensing.spots import SpotArray
+
+Array = NDArray[np.float64]
+
+EVERYTHING = (SCENERY, PERSON, ROBOT_COLLISION)  # geometry groups
+RING = 6  # rays on the mantle of a cone, besides its axis
 
 
 def cast(
     scene: Scene,
     data: Any,
-    origins: NDArray[np.float64],
-    directions: NDArray[np.float64],
-    cutoff: float,
-) -> NDArray[np.float64]:
-    """Distances to the first surface of person or board along k rays.
+    origins: Array,
+    directions: Array,
+    cutoff: Array | float,
+    *,
+    groups: tuple[int, ...] = EVERYTHING,
+    bodies: NDArray[np.intp] | None = None,
+) -> Array:
+    """Distances to the first surface along k rays.
 
-    A ray that starts inside a part of the person meets its surface from inside.
+    A ray that starts inside a body meets its surface from inside.
 
     Args:
         scene: The scene.
         data: Its state, geom poses up to date.
         origins: World frame, (k, 3) [m].
-        directions: World frame, of any length above 0, (k, 3).
-        cutoff: Farther surfaces are not seen [m].
+        directions: World frame, of any length above 0, (k, 3), or several from each origin (k, n, 3).
+        cutoff: Farther surfaces are not seen, (k,) or one number [m].
+        groups: Geometry groups that are seen.
+        bodies: A body that each ray does not see, (k,), -1 for none.
 
     Returns:
-        (k,) distances [m], +inf where nothing lies within `cutoff`, NaN for a ray that is no ray (an origin or
-        direction that is not finite, a direction of length 0): nothing is known about what it would meet.
+        (k,) or (k, n) distances [m], +inf where nothing lies within `cutoff`, NaN for a ray that is no ray (an origin
+        or direction that is not finite, a direction of length 0): nothing is known about what it would meet.
     """
-    lengths = np.sqrt((directions * directions).sum(axis=1))
-    valid = np.isfinite(origins).all(axis=1) & np.isfinite(lengths) & (lengths > 0.0)
-    hit = np.full(len(origins), np.nan)
-    model, hit_geom = scene.model, np.empty(1, dtype=np.int32)
-    for i in np.flatnonzero(valid):
-        hit[i] = mujoco.mj_ray(model, data, origins[i], directions[i] / lengths[i], _SEEN, True, -1, hit_geom)
+    many = directions if directions.ndim == 3 else directions[:, None, :]
+    k, n = many.shape[:2]
+    lengths = np.sqrt((many * many).sum(axis=2))
+    valid = np.isfinite(origins).all(axis=1)[:, None] & np.isfinite(lengths) & (lengths > 0.0)
+    safe = np.where(valid[..., None], many, (0.0, 0.0, 1.0)) / np.where(valid, lengths, 1.0)[..., None]
+    places = np.where(valid.any(axis=1)[:, None], origins, 0.0)
+    seen = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
+    seen[list(groups)] = 1
+    hit, geom = np.empty((k, n)), np.empty(n, dtype=np.int32)
+    limit = np.broadcast_to(np.asarray(cutoff, dtype=float), (k,))
+    for i in range(k):
+        exclude = -1 if bodies is None else int(bodies[i])
+        mujoco.mj_multiRay(
+            scene.model, data, places[i], safe[i].ravel(), seen, True, exclude, geom, hit[i], None, n, limit[i]
+        )
     hit[hit < 0.0] = np.inf  # MuJoCo's miss is -1
-    hit[hit > cutoff] = np.inf
-    return hit
+    hit[hit > limit[:, None]] = np.inf
+    hit[~valid] = np.nan
+    return hit if directions.ndim == 3 else hit[:, 0]
+
+
+class SpotRays:
+    """What an ideal distance sensor of the given cone reads at every spot: the nearest surface in the cone.
+
+    Args:
+        scene: The scene.
+        spots: The robot's spots.
+    """
+
+    def __init__(self, scene: Scene, spots: SpotArray) -> None:
+        self._scene, self._spots = scene, spots
+        self._bodies = np.array([_body(scene, frame) for frame in spots.frames], dtype=np.intp)
+        self._slant = np.tan(0.5 * spots.field_of_view)
+        angle = 2.0 * np.pi * np.arange(RING) / RING
+        self._circle = np.stack((np.cos(angle), np.sin(angle)), axis=1)  # (RING, 2)
+
+    def distances(self, data: Any, state: RobotState, reach: Array | float | None = None) -> Array:
+        """Distance read by every spot (k,) [m], +inf where nothing is within reach.
+
+        Args:
+            data: State of the scene, geom poses up to date.
+            state: The robot in the same configuration.
+            reach: Farther surfaces are not seen, by default the spots' range [m].
+        """
+        origins, axes = self._spots.rays(state)
+        limit = self._spots.range_max if reach is None else reach
+        across = np.where(np.abs(axes[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+        u = np.cross(axes, across)
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        basis = np.stack((u, np.cross(axes, u)), axis=1)  # (k, 2, 3)
+        mantle = axes[:, None, :] + self._slant[:, None, None] * (self._circle @ basis)
+        rays = np.concatenate((axes[:, None, :], mantle), axis=1)
+        return cast(self._scene, data, origins, rays, limit, bodies=self._bodies).min(axis=1)
+
+
+def _body(scene: Scene, frame: str) -> int:
+    """The MuJoCo body that a frame of the robot is fixed to."""
+    model, robot = scene.model, scene.robot
+    target = "robot/" + robot.model.frames[robot.frame_id(frame)].name
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, target)
+    return (
+        int(model.site_bodyid[site]) if site >= 0 else int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, target))
+    )

@@ -21,15 +21,29 @@ def bench(
     screen.print("Warming up (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from rich.table import Table
 
-    from qpsafe.timing import machine, time_danger_field, time_ticks
+    from qpsafe.timing import machine, time_danger_field, time_sensing, time_ticks
+    from qpsafe.timing_peers import time_mink, time_pink
 
     with progress_bar(screen) as progress:
         task = progress.add_task("danger field", total=2000)
         field = time_danger_field(2000, lambda: progress.advance(task))
         rows = {"danger field, 20 points x 6 links": field}
+        task = progress.add_task("sensing", total=5000)
+        sensing = time_sensing(5000, lambda: progress.advance(task))
+        rows["sensing, 20 spots, all filters"] = sensing
         for name, law in _laws().items():
             task = progress.add_task(f"tick, {name}", total=ticks)
-            rows[f"controller.step, 20 detections, {name}"] = time_ticks(law, ticks, partial(progress.advance, task))
+            rows[f"controller.step, 20 spots, {name}"] = time_ticks(law, ticks, partial(progress.advance, task))
+        task = progress.add_task("tick, points", total=ticks)
+        step = partial(progress.advance, task)
+        rows["controller.step, 20 points given, hierarchical strict"] = time_ticks(
+            _laws()["hierarchical strict"], ticks, step, points=True
+        )
+        task = progress.add_task("mink and pink", total=2 * 5000)
+        rows["mink.solve_ik + daqp: frame, posture, limits"] = time_mink(5000, partial(progress.advance, task))
+        pink = time_pink(5000, partial(progress.advance, task))
+        if pink is not None:
+            rows["pink.solve_ik + daqp: frame, posture, limits"] = pink
     table = Table(title=f"Wall time [µs], one thread: {machine()['processor']}, Python {machine()['python']}")
     table.add_column("what")
     for heading in ("runs", "median", "p99", "p99.9", "max"):

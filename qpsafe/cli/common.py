@@ -32,6 +32,13 @@ class ProjectionName(StrEnum):
     paper = "paper"
 
 
+class SensorName(StrEnum):
+    """Sensors that the simulation offers."""
+
+    ideal = "ideal"
+    sharp = "sharp"
+
+
 def make_law(name: LawName, projection: ProjectionName, solver: str | None = None) -> Law:
     """The law of the given name."""
     from qpsafe.laws.hierarchical import HierarchicalLaw

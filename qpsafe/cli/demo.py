@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, write_text
+from qpsafe.cli.common import (
+    LawName,
+    ProjectionName,
+    SensorName,
+    console,
+    make_law,
+    print_json,
+    progress_bar,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,6 +47,9 @@ def fixed(
         float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
     ] = 0.0,
     duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Length of the run [s].")] = 60.0,
+    sensor: Annotated[
+        SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
+    ] = SensorName.ideal,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -50,7 +62,12 @@ def fixed(
     from qpsafe.sim.fixed import FixedExperiment
 
     experiment = FixedExperiment(
-        load_robot("irb140"), make_law(law, projection, solver), seed=seed, lag=lag, duration=duration
+        load_robot("irb140"),
+        make_law(law, projection, solver),
+        seed=seed,
+        lag=lag,
+        duration=duration,
+        sensor=sensor.value,
     )
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
     out.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from qpsafe import __version__
-from qpsafe.cli import bench, compare, demo, robots
+from qpsafe.cli import bench, calibrate, compare, demo, robots, sick_sensors
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(
@@ -22,6 +22,8 @@ app.add_typer(demo.app, name="demo")
 app.command("compare")(compare.compare)
 app.command("robots")(robots.robots)
 app.command("bench")(bench.bench)
+app.command("calibrate")(calibrate.calibrate)
+app.command("sick-sensors")(sick_sensors.sick_sensors)
 
 
 def _version(value: bool) -> None:

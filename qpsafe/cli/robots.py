@@ -62,4 +62,5 @@ def robots(
     screen.print("frames: " + ", ".join(robot.frame_names), highlight=False)
     screen.print("wire:   " + ", ".join(f"{a}-{b}" for a, b in robot.wire_frames), highlight=False)
     if spots is not None:
-        screen.print(f"spots:  {len(spots)}, range {spots.range_min} to {spots.range_max} m: {', '.join(spots.names)}")
+        ranges = f"range {spots.range_min.min()} to {spots.range_max.max()} m"
+        screen.print(f"spots:  {len(spots)}, {ranges}: {', '.join(spots.names)}")

@@ -49,6 +49,10 @@ class RobotState:
         if data is not None:
             self.robot._give_back(data)
 
+    def body_poses(self) -> NDArray[np.float64]:
+        """Poses in the world of all moving bodies, body i moved by joint i (from 1); 0 is the world, (n + 1, 4, 4)."""
+        return np.array([placement.homogeneous for placement in self._data.oMi])
+
     def pose(self, frame: str) -> NDArray[np.float64]:
         """Pose of a frame in the world, (4, 4) [m]."""
         return self._placements[self.robot.frame_id(frame)].homogeneous

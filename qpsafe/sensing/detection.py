@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.sensing.health import CLEAR
+
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.robot.wire import Wire
-    from qpsafe.sensing.hold import PointHold
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.sensing import DistanceSensing
 
 
 class BadInput(Exception):
@@ -25,10 +26,16 @@ class Detection(NamedTuple):
     Attributes:
         points: (p, 3), world frame [m].
         links: Wire link of each point, (p,), from 0.
+        velocities: Of the points (p, 3) [m/s], or None where they are taken as standing still.
+        notes: What is wrong with the sensors, in words.
+        capped: Whether the robot has to go slowly, since a sensor is dead.
     """
 
     points: NDArray[np.float64]
     links: NDArray[np.int64]
+    velocities: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+    capped: bool = False
 
 
 #: How far outside its limits a measured joint may be [rad], and how many times its largest speed it may have. Beyond
@@ -66,24 +73,24 @@ def _as_joint_vector(
 def as_detection(
     state: RobotState,
     wire: Wire,
-    spots: SpotArray | None,
-    hold: PointHold,
+    sensing: DistanceSensing | None,
     distances: ArrayLike | None,
     points: ArrayLike | None,
+    ages: ArrayLike | None = None,
 ) -> Detection:
     """The detected points of one tick.
 
     Args:
         state: Robot at the measured joint position.
         wire: Its wire model.
-        spots: The distance sensors, or None.
-        hold: Memory of points that the spots lost a moment ago.
+        sensing: The distance sensors with what they remember, or None.
         distances: One reading per spot (k,) [m], or points (p, 3), or None.
         points: Points (p, 3) [m], or None.
+        ages: How old each distance is (k,), or one number for all [s].
 
     Raises:
-        BadInput: Wrong shape; a distance that is NaN or below zero; a point that is not finite; both or neither kind
-            given: silence is not safety, "nothing in sight" is said by distances of +inf or an empty list of points.
+        BadInput: Wrong shape; too many spots out of order; a point that is not finite; both or neither kind given:
+            silence is not safety, "nothing in sight" is said by distances of +inf or an empty list of points.
     """
     if distances is not None and points is not None:
         raise BadInput("both distances and points are given, expected one of them")
@@ -91,26 +98,33 @@ def as_detection(
         array = _as_floats("distances", distances)
         if array.ndim == 2 and array.shape[1] == 3:
             return _from_points(wire, array)
-        return _from_distances(state, spots, hold, array)
+        return _from_distances(state, wire, sensing, array, ages)
     if points is not None:
         return _from_points(wire, _as_floats("points", points))
     raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
 
 
 def _from_distances(
-    state: RobotState, spots: SpotArray | None, hold: PointHold, distances: NDArray[np.float64]
+    state: RobotState,
+    wire: Wire,
+    sensing: DistanceSensing | None,
+    distances: NDArray[np.float64],
+    ages: ArrayLike | None,
 ) -> Detection:
-    if spots is None:
+    if sensing is None:
         raise BadInput("distances are given but the robot has no spots")
-    if distances.shape != (len(spots),):
-        raise BadInput(f"distances have shape {distances.shape}, expected ({len(spots)},)")
-    if not (distances >= 0.0).all():  # NaN fails the comparison too
-        bad = [f"{spots.names[i]} = {distances[i]:g}" for i in np.flatnonzero(~(distances >= 0.0))]
-        raise BadInput("distances below zero or not a number: " + ", ".join(bad))
-    hit = spots.detected(distances)
-    points = spots.points(state, np.where(hit, distances, 0.0))
-    counts = hold.update(points, np.where(hit, distances, np.inf))
-    return Detection(points[counts], spots.links[counts])
+    shape = (len(sensing.spots),)
+    if distances.shape != shape:
+        raise BadInput(f"distances have shape {distances.shape}, expected {shape}")
+    if ages is not None:
+        ages = _as_floats("ages", ages)
+        if ages.shape not in ((), shape):
+            raise BadInput(f"ages have shape {ages.shape}, expected {shape} or one number")
+        ages = np.broadcast_to(ages, shape)
+    seen = sensing.update(state, wire, distances, ages)
+    if seen.too_many:
+        raise BadInput("; ".join(seen.notes))
+    return Detection(seen.points, seen.links, seen.velocities, seen.notes, seen.severity != CLEAR)
 
 
 def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:

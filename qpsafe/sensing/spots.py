@@ -2,56 +2,50 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.danger.compiled import entry, readable
+from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
 
-_Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
-_Vector = tuple[_Finite, _Finite, _Finite]
+Array = NDArray[np.float64]
 
 
-class Spot(BaseModel):
+@dataclass(frozen=True)
+class Spot:
     """One distance sensor.
 
     Attributes:
         name: Shown in reports.
-        link: Wire link (1 = first) that carries it; its danger vector acts on this link, eq. (8).
-        frame: Frame of that link in which the pose is given, e.g. ``dh3``.
-        position: Origin of the spot in `frame` [m].
-        direction: Measuring direction in `frame`, unit vector: the spot's z axis in eq. (7).
+        link: Wire link that carries it, counted from 0; its danger vector acts on this link, eq. (8).
+        frame: Frame in which its pose is given: the Denavit-Hartenberg frame of that link.
+        pose: The constant matrix of eq. (7) from that frame to the spot's, whose z axis is the measuring direction,
+            (4, 4) [m].
+        range_min: Smallest distance the sensor resolves [m].
+        range_max: Largest distance that counts as a detection [m].
+        field_of_view: Full opening angle of the cone it sees [rad]. The point is always put on the cone's axis.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     name: str
-    link: Annotated[int, Field(strict=True, ge=1)]
+    link: int
     frame: str
-    position: _Vector
-    direction: _Vector
+    pose: Array
+    range_min: float
+    range_max: float
+    field_of_view: float
 
 
-class SpotFile(BaseModel):
-    """Contents of a `spots.toml`: the sensor's range [m] and the spots."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    sensor: str
-    range_min: _Positive
-    range_max: _Positive
-    spot: list[Spot]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpotArray:
     """The distributed distance sensor of section II-B.
 
@@ -61,63 +55,71 @@ class SpotArray:
         frames: Frame in which each spot's pose is given, (k,).
         positions: Origins in those frames, (k, 3) [m].
         directions: Measuring directions in those frames, (k, 3), unit.
-        range_min: Smallest distance the sensor resolves [m].
-        range_max: Largest distance that counts as a detection [m].
+        range_min: Smallest distance the sensor resolves, (k,) or one number for all [m].
+        range_max: Largest distance that counts as a detection, (k,) or one number [m].
+        field_of_view: Full opening angle of the cone it sees, (k,) or one number [rad].
     """
 
     names: tuple[str, ...]
     links: NDArray[np.int64]
     frames: tuple[str, ...]
-    positions: NDArray[np.float64]
-    directions: NDArray[np.float64]
-    range_min: float
-    range_max: float
+    positions: Array
+    directions: Array
+    range_min: Array
+    range_max: Array
+    field_of_view: Array = field(default_factory=lambda: np.zeros(1))
+
+    def __post_init__(self) -> None:
+        for key in ("range_min", "range_max", "field_of_view"):
+            value = np.asarray(getattr(self, key), dtype=float)
+            if value.shape in ((), (1,)):
+                value = np.full(len(self.names), float(value.reshape(())))
+            object.__setattr__(self, key, value)
 
     def __len__(self) -> int:
         return len(self.names)
 
     @classmethod
+    def of(cls, spots: Sequence[Spot]) -> SpotArray:
+        """An array of single spots."""
+        return cls(
+            names=tuple(spot.name for spot in spots),
+            links=np.array([spot.link for spot in spots], dtype=np.int64),
+            frames=tuple(spot.frame for spot in spots),
+            positions=np.array([spot.pose[:3, 3] for spot in spots], dtype=float).reshape(-1, 3),
+            directions=np.array([spot.pose[:3, 2] for spot in spots], dtype=float).reshape(-1, 3),
+            range_min=np.array([spot.range_min for spot in spots]),
+            range_max=np.array([spot.range_max for spot in spots]),
+            field_of_view=np.array([spot.field_of_view for spot in spots]),
+        )
+
+    @classmethod
     def load(cls, path: Path, robot: Robot) -> SpotArray:
-        """Read and check a `spots.toml`.
+        """Read and check a `spots.toml`, see `qpsafe.sensing.spot_file.read_spots`.
 
         Args:
             path: The file.
             robot: Robot that carries the spots.
 
         Raises:
-            RobotFileError: Names file, key and value of what is wrong: malformed TOML, an unknown frame, a link the
-                robot does not have, a direction that is not a unit vector, an empty range.
+            RobotFileError: Names file, key and value of what is wrong.
         """
-        try:
-            content = SpotFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise RobotFileError(path, "file", str(path), f"a readable file ({error.strerror})") from None
-        except tomllib.TOMLDecodeError as error:
-            raise RobotFileError(path, "file", str(path), f"valid TOML ({error})") from None
-        except UnicodeDecodeError as error:
-            raise RobotFileError(path, "file", str(path), f"text in UTF-8 ({error})") from None
-        except ValidationError as error:
-            first = error.errors()[0]
-            key = ".".join(str(part) for part in first["loc"])
-            raise RobotFileError(path, key, first.get("input"), first["msg"]) from None
-        if not content.range_min < content.range_max:
-            raise RobotFileError(path, "range_min", content.range_min, f"less than range_max = {content.range_max}")
-        for i, spot in enumerate(content.spot):
-            key = f"spot[{i}] ({spot.name})"
-            if spot.frame not in robot.frame_names:
-                raise RobotFileError(path, f"{key}.frame", spot.frame, f"one of {', '.join(robot.frame_names)}")
-            if spot.link > len(robot.wire_frames):
-                raise RobotFileError(path, f"{key}.link", spot.link, f"a link in 1..{len(robot.wire_frames)}")
-            if abs(float(np.linalg.norm(spot.direction)) - 1.0) > 1e-6:
-                raise RobotFileError(path, f"{key}.direction", spot.direction, "a vector of length 1")
-        return cls(
-            names=tuple(spot.name for spot in content.spot),
-            links=np.array([spot.link - 1 for spot in content.spot], dtype=np.int64),
-            frames=tuple(spot.frame for spot in content.spot),
-            positions=np.array([spot.position for spot in content.spot], dtype=float).reshape(-1, 3),
-            directions=np.array([spot.direction for spot in content.spot], dtype=float).reshape(-1, 3),
-            range_min=content.range_min,
-            range_max=content.range_max,
+        from qpsafe.sensing.spot_file import read_spots
+
+        return cls.of(read_spots(path, robot))
+
+    def subset(self, order: Sequence[int]) -> SpotArray:
+        """Some of the spots, or all in another order."""
+        i = np.asarray(order, dtype=np.int64)
+        return SpotArray(
+            names=tuple(self.names[n] for n in i),
+            links=self.links[i],
+            frames=tuple(self.frames[n] for n in i),
+            positions=self.positions[i],
+            directions=self.directions[i],
+            range_min=self.range_min[i],
+            range_max=self.range_max[i],
+            field_of_view=self.field_of_view[i],
         )
 
     def check(self, robot: Robot) -> None:
@@ -125,10 +127,12 @@ class SpotArray:
 
         Raises:
             ConfigurationError: Arrays that do not fit together, numbers that are not finite, a direction that is not
-                a unit vector, an unknown frame, a link the robot does not have, an empty range.
+                a unit vector, an unknown frame, a link the robot does not have, an empty range, an impossible cone.
         """
         k, links = len(self), len(robot.wire_frames)
-        for key, shape in (("links", (k,)), ("frames", (k,)), ("positions", (k, 3)), ("directions", (k, 3))):
+        shapes = {"links": (k,), "frames": (k,), "positions": (k, 3), "directions": (k, 3)}
+        shapes |= dict.fromkeys(("range_min", "range_max", "field_of_view"), (k,))
+        for key, shape in shapes.items():
             if np.shape(getattr(self, key)) != shape:
                 found = f"an array of shape {np.shape(getattr(self, key))}"
                 raise ConfigurationError("SpotArray", key, found, f"shape {shape} for {k} names")
@@ -141,33 +145,72 @@ class SpotArray:
             raise ConfigurationError("SpotArray", "positions", self.positions, "finite numbers [m]")
         if not (np.abs(np.linalg.norm(self.directions, axis=1) - 1.0) <= 1e-6).all():
             raise ConfigurationError("SpotArray", "directions", self.directions, "vectors of length 1")
-        if not 0.0 < self.range_min < self.range_max < np.inf:
+        if not ((self.range_min > 0.0) & (self.range_min < self.range_max) & np.isfinite(self.range_max)).all():
             found = f"{self.range_min}..{self.range_max}"
             raise ConfigurationError("SpotArray", "range_min", found, "0 < range_min < range_max, finite [m]")
+        if not ((self.field_of_view >= 0.0) & (self.field_of_view <= np.pi / 2)).all():
+            raise ConfigurationError("SpotArray", "field_of_view", self.field_of_view, "0 to pi/2 rad")
 
-    def rays(self, state: RobotState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def mounting(self, robot: Robot) -> tuple[NDArray[np.int64], Array]:
+        """The body of each spot (k,), and in that body's frame its origin and direction, homogeneous columns (k, 4, 2).
+
+        Bodies are numbered as in `RobotState.body_poses`.
+        """
+        bodies = np.empty(len(self), dtype=np.int64)
+        rays = np.zeros((len(self), 4, 2))
+        for i, name in enumerate(self.frames):
+            frame = robot.model.frames[robot.frame_id(name)]
+            bodies[i] = frame.parentJoint
+            rays[i, :3, 0], rays[i, 3, 0], rays[i, :3, 1] = self.positions[i], 1.0, self.directions[i]
+            rays[i] = frame.placement.homogeneous @ rays[i]
+        return bodies, rays
+
+    def rays(self, state: RobotState) -> tuple[Array, Array]:
         """Origins (k, 3) [m] and unit directions (k, 3) of all spots in the world frame."""
-        origins, directions = np.empty_like(self.positions), np.empty_like(self.directions)
-        for frame in dict.fromkeys(self.frames):
-            here = np.array([other == frame for other in self.frames])
-            pose = state.pose(frame)
-            origins[here] = self.positions[here] @ pose[:3, :3].T + pose[:3, 3]
-            directions[here] = self.directions[here] @ pose[:3, :3].T
-        return origins, directions
+        bodies, rays = self.mounting(state.robot)
+        return rays_in_world(state.body_poses(), bodies, rays)
 
-    def points(self, state: RobotState, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Detected points (k, 3) in the world frame, eq. (7): origin + d_k times the measuring direction.
+    def points(self, state: RobotState, distances: Array) -> Array:
+        """Detected points (k, 3) in the world frame, eq. (7).
 
         Args:
             state: Robot at the measured joint position.
             distances: d_k, (k,) [m], finite.
         """
-        origins, directions = self.rays(state)
-        return origins + distances[:, None] * directions
+        return detected_points(*self.rays(state), distances)
 
-    def detected(self, distances: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def detected(self, distances: Array) -> NDArray[np.bool_]:
         """Which distances (k,) are detections: those within `range_max`. +inf means nothing in sight (REP 117)."""
         return distances <= self.range_max
+
+
+def rays_in_world(poses: Array, bodies: NDArray[np.int64], rays: Array) -> tuple[Array, Array]:
+    """Origins and directions (k, 3) of rays that are fixed in bodies with the given poses (b, 4, 4)."""
+    origins, directions = np.empty((len(bodies), 3)), np.empty((len(bodies), 3))
+    _rays(poses, bodies, rays, origins, directions)
+    return origins, directions
+
+
+@entry(
+    types.void(
+        readable(3),
+        types.Array(types.int64, 1, "A", readonly=True),
+        readable(3),
+        types.float64[:, ::1],
+        types.float64[:, ::1],
+    )
+)
+def _rays(poses: Array, bodies: Array, rays: Array, origins: Array, directions: Array) -> None:
+    for i in range(bodies.shape[0]):
+        T, a = poses[bodies[i]], rays[i]
+        for j in range(3):
+            origins[i, j] = T[j, 0] * a[0, 0] + T[j, 1] * a[1, 0] + T[j, 2] * a[2, 0] + T[j, 3]
+            directions[i, j] = T[j, 0] * a[0, 1] + T[j, 1] * a[1, 1] + T[j, 2] * a[2, 1]
+
+
+def detected_points(origins: Array, directions: Array, distances: Array) -> Array:
+    """Eq. (7): the point (0, 0, d_k) of the spot's frame, in the world: origin + d_k times the measuring direction."""
+    return origins + distances[:, None] * directions
 
 
 def load_spots(robot: Robot) -> SpotArray | None:

@@ -8,6 +8,7 @@ import pytest
 import qpsafe
 from qpsafe.sensing.detection import nearest_link
 
+PLAIN = qpsafe.SensingRules(hold_time=0.0, self_detection=False)
 LAWS = {
     "strict": qpsafe.HierarchicalLaw,
     "paper": lambda: qpsafe.HierarchicalLaw("paper"),
@@ -107,8 +108,8 @@ def test_distances_and_the_points_they_mean_give_the_same_command(run: Any, irb1
         distances[~own] = np.inf
         compared += int(own.sum())
         for law in (qpsafe.HierarchicalLaw(), qpsafe.NullspaceLaw()):
-            by_distance = run(law, q=q, hold_time=0.0).feed(q, qd, distances)
-            by_point = run(law, q=q, hold_time=0.0).feed(q, qd, points=points[own])
+            by_distance = run(law, q=q, sensing=PLAIN).feed(q, qd, distances)
+            by_point = run(law, q=q, sensing=PLAIN).feed(q, qd, points=points[own])
             assert np.array_equal(by_distance.points, by_point.points)
             assert np.array_equal(by_distance.links, by_point.links)
             assert np.array_equal(by_distance.reference.qd, by_point.reference.qd)

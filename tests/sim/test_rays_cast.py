@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.person import SEGMENTS
 from qpsafe.sim.rays import cast
-from qpsafe.sim.scene import build_scene
+from qpsafe.sim.scene import PERSON, build_scene
 
 SCENE = build_scene(load_robot("irb140"))
 DATA = SCENE.make_data()
@@ -73,7 +73,7 @@ def test_rays_agree_with_geometry(x, y, heading, origin, target, cutoff):
     assume(outside(pose, origin))
     direction /= np.linalg.norm(direction)
     SCENE.place_person(DATA, pose)
-    got = cast(SCENE, DATA, origin[None], direction[None], cutoff)[0]
+    got = cast(SCENE, DATA, origin[None], direction[None], cutoff, groups=(PERSON,))[0]
     wanted = expected(pose, origin, direction, cutoff)
     if math.isinf(wanted) != math.isinf(got):  # grazing or at the very cutoff: either answer is right
         nudge = np.array([3e-7, -2e-7, 1e-7])
@@ -90,15 +90,20 @@ def test_rays_agree_with_geometry(x, y, heading, origin, target, cutoff):
 def test_the_board_ahead_is_seen_at_its_distance_and_not_beyond_the_cutoff():
     SCENE.place_person(DATA, SCENE.person.pose(1.42, 0.0, math.pi))  # face at x = 1
     origins, ahead = np.tile([0.3, 0.0, 0.6], (3, 1)), np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0]])
-    assert cast(SCENE, DATA, origins, ahead, 0.8) == pytest.approx([0.7, np.inf, np.inf], abs=1e-12)
-    assert np.isinf(cast(SCENE, DATA, origins, ahead, 0.699)).all()
+    assert cast(SCENE, DATA, origins, ahead, 0.8, groups=(PERSON,)) == pytest.approx([0.7, np.inf, np.inf], abs=1e-12)
+    assert np.isinf(cast(SCENE, DATA, origins, ahead, 0.699, groups=(PERSON,))).all()
 
 
-def test_robot_and_floor_are_transparent():
+def test_robot_floor_and_pedestal_are_seen_unless_left_out():
     SCENE.place_person(DATA, SCENE.person.pose(1.42, 0.0, math.pi))
     behind = np.array([[-1.0, 0.0, 0.45]])  # the robot's body stands between here and the board
-    assert cast(SCENE, DATA, behind, np.array([[1.0, 0.0, 0.0]]), 5.0) == pytest.approx([2.0], abs=1e-12)
-    assert np.isinf(cast(SCENE, DATA, behind, np.array([[0.0, 0.0, -1.0]]), 5.0)).all()
+    ahead, down = np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 0.0, -1.0]])
+    assert cast(SCENE, DATA, behind, ahead, 5.0, groups=(PERSON,)) == pytest.approx([2.0], abs=1e-12)
+    (robot,) = cast(SCENE, DATA, behind, ahead, 5.0)
+    assert 0.7 < robot < 1.2
+    assert cast(SCENE, DATA, behind, down, 5.0) == pytest.approx([0.45 + SCENE.pedestal], abs=1e-12)
+    assert cast(SCENE, DATA, behind * [0.3, 1.0, 1.0], down, 5.0) < 0.45 + 0.021  # the pedestal's top
+    assert np.isinf(cast(SCENE, DATA, behind, down, 5.0, groups=(PERSON,))).all()
 
 
 def test_the_length_of_a_direction_does_not_matter():
@@ -117,7 +122,7 @@ def test_a_ray_that_is_none_is_unknown_and_spoils_no_other():
     origins = np.tile([0.3, 0.0, 0.6], (4, 1))
     directions = np.tile([1.0, 0.0, 0.0], (4, 1))
     origins[0, 1], directions[1, 2], directions[2] = np.nan, np.inf, 0.0
-    got = cast(SCENE, DATA, origins, directions, 0.8)
+    got = cast(SCENE, DATA, origins, directions, 0.8, groups=(PERSON,))
     assert np.isnan(got[:3]).all()
     assert got[3] == pytest.approx(0.7)
 

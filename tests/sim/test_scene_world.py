@@ -119,7 +119,7 @@ def test_the_camera_sees_the_robot_past_the_person(scene, name):
             scene.place_person(data, choreography.pose(phase.end))
             for mark in marks:
                 way = np.linalg.norm(mark - lens)
-                assert np.isinf(cast(scene, data, lens[None], (mark - lens)[None], way)).all(), phase
+                assert np.isinf(cast(scene, data, lens[None], (mark - lens)[None], way, groups=(PERSON,))).all(), phase
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,131 @@
+"""`qpsafe calibrate`: identify the curves of the distance sensors from a person's own measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpsafe.cli.common import console, print_json, write_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sensing.calibration import Fit
+
+
+def calibrate(
+    file: Annotated[Path, typer.Argument(help="CSV with the columns spot, distance [m], voltage [V].")],
+    robot: Annotated[
+        str | None, typer.Option(help="Robot folder to write calibration.toml into; its spots must all be in the file.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the curves to this file instead.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also draw curves and residuals into this PNG file.")] = None,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="95 % of the pairs must fit within this [m].")] = 0.01,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
+) -> None:
+    """Fit each spot's curve V(d) = gain/(d + offset) + bias robustly to the pairs between 20 and 80 cm.
+
+    Shows the residuals; exit code 1 if those of a spot exceed the tolerance (the curves are written all the same).
+    """
+    from qpsafe.sensing.calibration import calibration_text, fit_all, read_pairs
+
+    screen = console(json)
+    target = _target(robot, out)
+    fits = fit_all(read_pairs(file))
+    if robot is not None:
+        _check_names(robot, [fit.spot for fit in fits], file)
+    write_text(target, calibration_text(fits))
+    if plot is not None:
+        _plot(fits, plot)
+    good = all(fit.error_95 <= tolerance for fit in fits)
+    if json:
+        print_json({"file": str(target), "good": good, "spots": [_row(fit) for fit in fits]})
+    else:
+        _show(fits, tolerance, screen)
+        screen.print(f"written to {target}" + (f", {plot}" if plot else ""), highlight=False)
+    if not good:
+        raise typer.Exit(1)
+
+
+def _target(robot: str | None, out: Path | None) -> Path:
+    """Where to write: never into an installed package without being told so."""
+    from qpsafe.errors import ConfigurationError
+    from qpsafe.robot.loader import bundled_robots
+    from qpsafe.sensing.calibration import FILE_NAME
+
+    if out is not None:
+        return out
+    if robot is None:
+        raise ConfigurationError("calibrate", "--robot", None, "a robot folder to write into, or a file by --out")
+    if robot in bundled_robots() and not Path(robot).is_dir():
+        expected = "a path of your own copy of the robot's folder, or a file by --out: bundled robots are not changed"
+        raise ConfigurationError("calibrate", "--robot", robot, expected)
+    if not (Path(robot) / "robot.toml").is_file():
+        raise ConfigurationError("calibrate", "--robot", robot, "a folder with a robot.toml")
+    return Path(robot) / FILE_NAME
+
+
+def _check_names(robot: str, found: list[str], file: Path) -> None:
+    from qpsafe.errors import ConfigurationError
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sensing.spots import load_spots
+
+    spots = load_spots(load_robot(robot))
+    names = spots.names if spots is not None else ()
+    for name in found:
+        if name not in names:
+            expected = f"a spot of {robot}: {', '.join(names) or 'it has none'}"
+            raise ConfigurationError(file, "spot", name, expected)
+    for name in names:
+        if name not in found:
+            raise ConfigurationError(file, "spot", None, f"pairs of spot {name!r} too")
+
+
+def _row(fit: Fit) -> dict[str, float | str | int]:
+    curve = fit.curve
+    return {
+        "spot": fit.spot,
+        "gain": curve.gain,
+        "offset": curve.offset,
+        "bias": curve.bias,
+        "pairs": len(fit.distances),
+        "ignored": fit.ignored,
+        "rms": float((fit.errors**2).mean() ** 0.5),
+        "error_95": fit.error_95,
+        "worst": float(abs(fit.errors).max()),
+        "within_1_cm": fit.share_within_1_cm,
+    }
+
+
+def _show(fits: list[Fit], tolerance: float, screen: Console) -> None:
+    from rich.table import Table
+
+    table = Table(title="Distance by the fitted curve minus true distance")
+    table.add_column("spot")
+    for heading in ("pairs", "ignored", "rms [cm]", "95 % [cm]", "worst [cm]", "within 1 cm"):
+        table.add_column(heading, justify="right")
+    for fit in fits:
+        row = _row(fit)
+        colour = "green" if fit.error_95 <= tolerance else "red"
+        table.add_row(
+            fit.spot,
+            str(row["pairs"]),
+            str(row["ignored"]),
+            f"{100 * float(row['rms']):.2f}",
+            f"[{colour}]{100 * fit.error_95:.2f}[/]",
+            f"{100 * float(row['worst']):.2f}",
+            f"{100 * fit.share_within_1_cm:.1f} %",
+        )
+    screen.print(table)
+
+
+def _plot(fits: list[Fit], path: Path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from qpsafe.sensing.calibration_plot import calibration_figure
+
+    figure = calibration_figure(fits)
+    figure.savefig(path, dpi=160)

@@ -1,0 +1,82 @@
+"""`qpsafe sick-sensors`: every sick-sensor case, injected in closed loop at random moments."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpsafe.cli.common import SensorName, console, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.sick import Result
+
+
+def sick_sensors(
+    moments: Annotated[int, typer.Option(min=1, max=200, help="Random moments of the first experiment.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the moments and of the spots that fall sick.")] = 0,
+    sensor: Annotated[SensorName, typer.Option(help="What the healthy spots are.")] = SensorName.ideal,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
+) -> None:
+    """Inject NaN, spikes, stuck, stale, dead sensors in the first experiment and print the matrix of reactions.
+
+    Exit code 1 if a reaction of docs/sensing.md is missing or late, a limit is passed, or the robot touches what it
+    would not have touched with healthy sensors.
+    """
+    screen = console(json)
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.sick import run_matrix
+
+    with progress_bar(screen) as progress:
+        task = progress.add_task(f"{moments} moments", total=None)
+        results = run_matrix(
+            FixedExperiment(load_robot("irb140"), sensor=sensor.value),
+            moments,
+            seed,
+            jobs=jobs,
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    good = all(result.kept for result in results)
+    if json:
+        print_json({"good": good, "cases": [result._asdict() | {"kept": result.kept} for result in results]})
+    else:
+        show(results, screen)
+    if not good:
+        raise typer.Exit(1)
+
+
+def show(results: list[Result], screen: Console) -> None:
+    """Print the matrix."""
+    from rich.table import Table
+
+    table = Table(title="Sick sensors in the first experiment, each case at every moment")
+    for heading in ("", "case", "promised reaction"):
+        table.add_column(heading)
+    for heading in ("moments", "ticks", "at most", "missing", "contacts", "limits", "nearest", "healthy"):
+        table.add_column(heading, justify="right")
+    for r in results:
+        table.add_row(
+            "[green]kept[/]" if r.kept else "[red]NOT kept[/]",
+            r.case,
+            r.promise,
+            f"{r.applied} of {r.moments}",
+            str(r.slowest),
+            str(r.within),
+            str(r.missing),
+            str(r.contacts),
+            "none" if r.passed <= 1e-9 else f"{r.passed:.1e}",
+            f"{r.nearest:.3f}",
+            f"{r.nearest_healthy:.3f}",
+        )
+    screen.print(table)
+    screen.print(
+        "moments: those where the case can show; ticks: slowest reaction, 4 ms each; limits: passed by how much, "
+        "relative;\nnearest, healthy: smallest distance to board or person [m], with the fault and without",
+        style="dim",
+        highlight=False,
+    )

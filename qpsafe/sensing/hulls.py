@@ -1,0 +1,184 @@
+"""Convex hulls of what is known to be there, and the test whether a point lies in one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A known obstacle that stands still: the convex hull of its vertices.
+
+    Attributes:
+        name: Shown in errors.
+        vertices: In the world frame, (v, 3) [m].
+
+    Raises:
+        ConfigurationError: Not (v, 3), not finite, or no volume.
+    """
+
+    name: str
+    vertices: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        half_spaces(self.name, self.vertices)
+
+    @classmethod
+    def box(cls, name: str, size: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0), pose: ArrayLike = ()) -> Obstacle:
+        """A box.
+
+        Args:
+            name: Shown in errors.
+            size: Full edge lengths (3,) [m].
+            centre: Its centre, world frame (3,) [m].
+            pose: Instead of the centre, its pose (4, 4).
+        """
+        edges = np.asarray(size, dtype=float)
+        if edges.shape != (3,) or not (np.isfinite(edges) & (edges > 0.0)).all():
+            raise ConfigurationError(f"obstacle {name}", "size", size, "three finite lengths > 0 [m]")
+        corners = np.array(list(product((-0.5, 0.5), repeat=3))) * edges
+        if np.size(pose):
+            return cls(name, _moved(name, corners, pose))
+        return cls(name, corners + np.asarray(centre, dtype=float))
+
+    @classmethod
+    def mesh(cls, name: str, path: str | Path, pose: ArrayLike = (), scale: float = 1.0) -> Obstacle:
+        """The convex hull of a mesh file (STL, OBJ, DAE ...), read by coal.
+
+        Args:
+            name: Shown in errors.
+            path: The file.
+            pose: Of the mesh in the world, (4, 4); the identity by default.
+            scale: Metres in one unit of the file.
+        """
+        import coal
+
+        if not Path(path).is_file():
+            raise ConfigurationError(f"obstacle {name}", "path", str(path), "a mesh file")
+        try:
+            vertices = np.array(coal.MeshLoader().load(str(path), np.ones(3)).vertices(), dtype=float)
+        except (ValueError, RuntimeError) as error:
+            raise ConfigurationError(f"obstacle {name}", "path", str(path), f"a mesh ({error})") from None
+        vertices = vertices.reshape(-1, 3) * scale
+        return cls(name, _moved(name, vertices, pose) if np.size(pose) else vertices)
+
+
+def _moved(name: str, points: Array, pose: ArrayLike) -> Array:
+    T = np.asarray(pose, dtype=float)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise ConfigurationError(f"obstacle {name}", "pose", pose, "a finite (4, 4) pose")
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def half_spaces(name: str, vertices: ArrayLike) -> Array:
+    """Half-spaces n·x + b <= 0 of the convex hull of vertices (v, 3), rows (n, b) with unit normals n.
+
+    The six sides of the bounding box are among them: they cut the spikes off that sharp edges grow when all faces are
+    moved outwards by a tolerance.
+
+    Raises:
+        ConfigurationError: See `Obstacle`.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    expected = "finite vertices (v, 3) that span a volume [m]"
+    points = np.asarray(vertices, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
+        raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
+    try:
+        faces = ConvexHull(points).equations  # outward unit normals, offsets
+    except QhullError:
+        raise ConfigurationError(f"obstacle {name}", "vertices", f"{len(points)} flat vertices", expected) from None
+    axes = np.vstack((np.eye(3), -np.eye(3)))
+    sides = np.column_stack((axes, -np.concatenate((points.max(axis=0), -points.min(axis=0)))))
+    planes = np.vstack((sides, faces))
+    _, first = np.unique(planes.round(9), axis=0, return_index=True)  # triangles of one face have one plane
+    return planes[np.sort(first)]
+
+
+class HullSet:
+    """Many hulls, each fixed in the frame of one of several bodies, as flat arrays for compiled code.
+
+    Args:
+        hulls: (body, name, vertices in the body's frame (v, 3) [m]) of each hull.
+    """
+
+    def __init__(self, hulls: Sequence[tuple[int, str, ArrayLike]]) -> None:
+        planes = [half_spaces(name, vertices) for _, name, vertices in hulls]
+        points = [np.asarray(vertices, dtype=float) for _, _, vertices in hulls]
+        centres = [0.5 * (p.min(axis=0) + p.max(axis=0)) for p in points]
+        self.names = tuple(name for _, name, _ in hulls)
+        self.bodies = np.array([body for body, _, _ in hulls], dtype=np.int64)
+        self.planes = np.vstack([np.zeros((0, 4)), *planes])
+        self.first = np.concatenate(([0], np.cumsum([len(p) for p in planes]))).astype(np.int64)
+        self.centres = np.array(centres).reshape(-1, 3)
+        self.radii = np.array([np.linalg.norm(p - c, axis=1).max() for p, c in zip(points, centres, strict=True)])
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def find(self, points: Array, tolerance: Array, poses: Array) -> NDArray[np.int64]:
+        """The first hull that each point lies in, (p,), -1 for none (and for a point that is not finite).
+
+        Args:
+            points: World frame, (p, 3) [m].
+            tolerance: How far beyond the faces still counts as inside, (p,) [m]; negative: how deep it must be.
+            poses: Of the bodies in the world, (b, 4, 4).
+        """
+        found = np.empty(len(points), dtype=np.int64)
+        _find(points, tolerance, poses, self.bodies, self.first, self.planes, self.centres, self.radii, found)
+        return found
+
+
+_INTS = types.Array(types.int64, 1, "A", readonly=True)
+
+
+@entry(
+    types.void(
+        readable(2), readable(1), readable(3), _INTS, _INTS, readable(2), readable(2), readable(1), types.int64[::1]
+    )
+)
+def _find(
+    points: Array,
+    tolerance: Array,
+    poses: Array,
+    bodies: Array,
+    first: Array,
+    planes: Array,
+    centres: Array,
+    radii: Array,
+    found: Array,
+) -> None:
+    found[:] = -1
+    for h in range(bodies.shape[0]):
+        T, c = poses[bodies[h]], centres[h]
+        cx = T[0, 0] * c[0] + T[0, 1] * c[1] + T[0, 2] * c[2] + T[0, 3]
+        cy = T[1, 0] * c[0] + T[1, 1] * c[1] + T[1, 2] * c[2] + T[1, 3]
+        cz = T[2, 0] * c[0] + T[2, 1] * c[1] + T[2, 2] * c[2] + T[2, 3]
+        for i in range(points.shape[0]):
+            dx, dy, dz = points[i, 0] - cx, points[i, 1] - cy, points[i, 2] - cz
+            # a face moved out by t moves no point of the hull's box out by more than 2 t
+            reach = radii[h] + 2.0 * max(tolerance[i], 0.0)
+            if found[i] >= 0 or not dx * dx + dy * dy + dz * dz <= reach * reach:
+                continue
+            # the point in the body's frame
+            x = T[0, 0] * dx + T[1, 0] * dy + T[2, 0] * dz + c[0]
+            y = T[0, 1] * dx + T[1, 1] * dy + T[2, 1] * dz + c[1]
+            z = T[0, 2] * dx + T[1, 2] * dy + T[2, 2] * dz + c[2]
+            inside = True
+            for k in range(first[h], first[h + 1]):
+                if not planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3] <= tolerance[i]:
+                    inside = False
+                    break
+            if inside:
+                found[i] = h

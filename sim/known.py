@@ -1,0 +1,36 @@
+"""What the robot's cell holds by plan: floor and pedestal as known obstacles for the controller's filter."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sim.scene import SCENERY, Scene
+
+FLOOR = (6.0, 6.0, 0.5)  # the floor as a slab: as far as any spot could look, and thick [m]
+
+
+def known_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
+    """The scenery's geoms as convex hulls: planes as slabs below them, boxes, cylinders as prisms around them."""
+    model, kind = scene.model, mujoco.mjtGeom
+    data = scene.make_data()
+    found = []
+    for geom in np.flatnonzero(model.geom_group == SCENERY):
+        name, size, shape = model.geom(geom).name, model.geom_size[geom], model.geom_type[geom]
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+        if shape == kind.mjGEOM_PLANE:
+            pose[:3, 3] -= 0.5 * FLOOR[2] * pose[:3, 2]
+            found.append(Obstacle.box(name, FLOOR, pose=pose))
+        elif shape == kind.mjGEOM_BOX:
+            found.append(Obstacle.box(name, 2.0 * size, pose=pose))
+        elif shape == kind.mjGEOM_CYLINDER:
+            angle = np.pi * np.arange(48) / 24
+            outer = size[0] / np.cos(np.pi / 48)
+            ring = np.stack((outer * np.cos(angle), outer * np.sin(angle)), axis=1)
+            corners = np.vstack([np.column_stack((ring, np.full(48, z))) for z in (-size[1], size[1])])
+            found.append(Obstacle(name, corners @ pose[:3, :3].T + pose[:3, 3]))
+        else:
+            raise ValueError(f"scenery geom {name} has no hull here: add its shape to sim/known.py")
+    return tuple(found)

@@ -1,0 +1,385 @@
+"""Sick sensors in closed loop: every case of docs/sensing.md, injected in the first experiment at random moments.
+
+The healthy run is simulated once. At every moment it is copied, and each copy goes on with another fault for a while.
+What is checked: no contact that the healthy run did not have, no limit passed, and the reaction that the table states
+within the ticks that it states.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.sensing.health import CAPPED, STOPPED
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sim.distance import board_distance, person_distance
+from qpsafe.sim.loop import FixedLoop
+from qpsafe.speed_cap import wire_speed
+
+if TYPE_CHECKING:
+    from qpsafe.sim.fixed import FixedExperiment
+
+Array = NDArray[np.float64]
+
+WINDOW = 150  # ticks that are simulated after a fault begins
+SHORT = 50  # ticks of a passing fault
+LIMIT_TOLERANCE = 1e-9
+
+
+class Record(NamedTuple):
+    """What is kept of one tick with a fault."""
+
+    status: str
+    severity: str
+    unseen: tuple[str, ...]
+    counted: Array  # distance of each spot's point that counts, as last seen (k,), +inf for none
+    cdf_n: float
+    speed: float  # of the wire, commanded [m/s]
+    q: Array
+    qd: Array
+    gap: float  # robot to board or person [m]
+    moved: float  # by the point that the first sick spot meant when the fault began [m]
+
+
+class Window(NamedTuple):
+    """A copy of the run from the moment on, with a fault."""
+
+    sick: NDArray[np.intp]  # spots
+    names: tuple[str, ...]
+    before: Array  # readings in the tick before the fault
+    healthy: Record  # the first tick as it would have been
+    ticks: list[Record]
+    after: str  # severity after acknowledging at the end
+    rules: SensingRules
+    dt: float
+
+
+class Reaction(NamedTuple):
+    """Whether and when the table's reaction came: tick from 1, None if it did not; whether it applied at all."""
+
+    tick: int | None
+    applies: bool = True
+
+
+class Case(NamedTuple):
+    """One line of the table.
+
+    Attributes:
+        name: What is wrong.
+        share: Share of the spots that are sick, 0 for a single one.
+        lasts: For how many ticks.
+        spoil: Readings and ages of the sick spots, from their healthy readings and those before the fault.
+        promise: The reaction.
+        within: Ticks it may take.
+        reaction: Finds it.
+    """
+
+    name: str
+    share: float
+    lasts: int
+    spoil: Callable[[Array, Array], tuple[Array | float, Array | float]]
+    promise: str
+    within: int
+    reaction: Callable[[Window], Reaction]
+
+
+def _first(window: Window, holds: Callable[[Record], bool]) -> Reaction:
+    return Reaction(next((k + 1 for k, record in enumerate(window.ticks) if holds(record)), None))
+
+
+def _reported(window: Window) -> Reaction:
+    """Named and held in the first tick, capped when dead, for good until acknowledged."""
+    i, name = window.sick[0], window.names[window.sick[0]]
+    first = window.ticks[0]
+    kept = first.counted[i] <= window.healthy.counted[i] + window.rules.jump or not window.before[i] < np.inf
+    dead = window.rules.ticks(window.rules.dead_after, window.dt)
+    capped = all(record.severity == CAPPED for record in window.ticks[dead - 1 :])
+    good = first.status == "degraded" and name in first.unseen and kept and capped and window.after == "clear"
+    return _first(window, lambda record: name in record.unseen) if good else Reaction(None)
+
+
+def _slowed(window: Window) -> Reaction:
+    """Capped until the end, and slow from some tick on."""
+    if window.ticks[-1].severity != CAPPED:
+        return Reaction(None)
+    fast = [k for k, record in enumerate(window.ticks) if record.speed > window.rules.speed_cap + 1e-6]
+    last = max(fast, default=-1) + 2
+    return Reaction(last if last <= len(window.ticks) else None)
+
+
+def _held(window: Window) -> Reaction:
+    """What counted goes on counting for the hold time."""
+    i = window.sick[0]
+    if not window.before[i] < np.inf or not window.healthy.counted[i] < np.inf:
+        return Reaction(1, applies=False)
+    hold = window.rules.ticks(window.rules.hold_time, window.dt)
+    return Reaction(1 if all(record.counted[i] < np.inf for record in window.ticks[:hold]) else None)
+
+
+def _counted(window: Window) -> Reaction:
+    i = window.sick[0]
+    return _first(window, lambda record: record.counted[i] <= 0.3 and record.cdf_n >= window.healthy.cdf_n - 1e-9)
+
+
+def _unmoved(window: Window) -> Reaction:
+    """A farther sample changes nothing: what counted still does."""
+    i = window.sick[0]
+    if not window.healthy.counted[i] < np.inf:
+        return Reaction(1, applies=False)
+    return Reaction(1 if window.ticks[0].counted[i] <= window.healthy.counted[i] + window.rules.jump else None)
+
+
+def _stuck(window: Window) -> Reaction:
+    """Named as soon as the reading is old enough and the robot has moved enough; ticks from then on."""
+    i, name = window.sick[0], window.names[window.sick[0]]
+    ticks = window.rules.ticks(window.rules.stuck_after, window.dt)
+    due = [k for k, r in enumerate(window.ticks) if k + 2 >= ticks and r.moved >= 1.05 * window.rules.stuck_motion]
+    if not due or not window.before[i] < np.inf:
+        return Reaction(1, applies=False)
+    found = next((k for k, record in enumerate(window.ticks) if name in record.unseen), None)
+    return Reaction(None if found is None else max(found - due[0] + 1, 1))
+
+
+def _stopped(window: Window) -> Reaction:
+    """Braking from the first tick, at rest for good from some tick on."""
+    if window.ticks[0].status != "bad_input" or window.ticks[-1].severity != STOPPED:
+        return Reaction(None)
+    moving = [k for k, record in enumerate(window.ticks) if np.abs(record.qd).max() > 0.0]
+    last = max(moving, default=-1) + 2
+    return Reaction(last if last <= len(window.ticks) else None)
+
+
+def _reads(value: float) -> Callable[[Array, Array], tuple[Array | float, Array | float]]:
+    return lambda now, before: (value, 0.0)
+
+
+BRAKE = 90  # ticks: the slowest joint to brake from full speed needs 84
+
+CASES: tuple[Case, ...] = (
+    Case("not a number, 0.2 s", 0.0, SHORT, _reads(np.nan), "reported, held, capped", 1, _reported),
+    Case("minus infinity, 0.2 s", 0.0, SHORT, _reads(-np.inf), "reported, held, capped", 1, _reported),
+    Case("negative, 0.2 s", 0.0, SHORT, _reads(-0.3), "reported, held, capped", 1, _reported),
+    Case(
+        "stale by 0.1 s, 0.2 s", 0.0, SHORT, lambda now, before: (before, 0.1), "reported, held, capped", 1, _reported
+    ),
+    Case("plus infinity, 0.2 s", 0.0, SHORT, _reads(np.inf), "held, moved nearer", 1, _held),
+    Case("out of range, far: 5 m, 0.2 s", 0.0, SHORT, _reads(5.0), "held, moved nearer", 1, _held),
+    Case("out of range, near: 5 cm, 0.2 s", 0.0, SHORT, _reads(0.05), "counts at once", 1, _counted),
+    Case("spike nearer, one sample", 0.0, 1, _reads(0.25), "counts at once", 1, _counted),
+    Case("spike farther, one sample", 0.0, 1, _reads(np.inf), "not believed", 1, _unmoved),
+    Case("stuck, for good", 0.0, WINDOW, lambda now, before: (before, 0.0), "reported, held, capped", 1, _stuck),
+    Case("dropped out, for good", 0.0, WINDOW, _reads(np.nan), "slow until acknowledged", BRAKE, _slowed),
+    Case("a quarter of the spots dead", 0.25, WINDOW, _reads(np.nan), "controlled stop", BRAKE, _stopped),
+    Case("all spots dead", 1.0, WINDOW, _reads(np.nan), "controlled stop", BRAKE, _stopped),
+)
+
+
+class Result(NamedTuple):
+    """One case over all moments.
+
+    Attributes:
+        case: Its name.
+        promise: The reaction.
+        within: Ticks it may take.
+        moments: How many moments were simulated.
+        applied: In how many of them the case could show (what is held must have been seen).
+        slowest: Ticks the reaction took at most.
+        missing: In how many moments it did not come.
+        contacts: In how many moments the robot touched board or person, where the healthy run did not.
+        passed: Largest excess over a joint limit, relative to it.
+        nearest: Smallest distance to board or person [m].
+        nearest_healthy: The same in the healthy run over the same windows [m].
+    """
+
+    case: str
+    promise: str
+    within: int
+    moments: int
+    applied: int
+    slowest: int
+    missing: int
+    contacts: int
+    passed: float
+    nearest: float
+    nearest_healthy: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether all that is promised was seen."""
+        in_time = self.missing == 0 and self.slowest <= self.within
+        return in_time and self.contacts == 0 and self.passed <= LIMIT_TOLERANCE
+
+
+def random_moments(experiment: FixedExperiment, count: int, seed: int) -> list[int]:
+    """Ticks at random within the approaches."""
+    rng = np.random.default_rng(seed)
+    windows = np.array(experiment.windows())
+    chosen = windows[rng.integers(len(windows), size=count)]
+    times = rng.uniform(chosen[:, 0] + 0.8, chosen[:, 1])
+    return sorted(int(t / 0.004) for t in times)
+
+
+def run_matrix(
+    experiment: FixedExperiment,
+    count: int = 20,
+    seed: int = 0,
+    cases: Sequence[Case] = CASES,
+    jobs: int = 2,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Result]:
+    """Inject every case at `count` random moments of the experiment.
+
+    Args:
+        experiment: The first experiment.
+        count: Number of moments, at random while a spot sees something during an approach.
+        seed: Of the moments and of the spots that fall sick.
+        cases: Lines of the table.
+        jobs: Processes, where the system can fork; 1 elsewhere.
+        progress: Called with work done and to do.
+    """
+    moments = random_moments(experiment, 5 * count, seed)
+    copies: list[tuple[FixedLoop, Array]] = []
+    loop = FixedLoop(experiment)
+    total = moments[-1] + 1 + count * (len(cases) + 1) * WINDOW
+    reading = np.full(0, np.inf)
+    for k in range(moments[-1] + 1):
+        if np.isfinite(reading).any():  # where nobody sees anything there is nothing to lose
+            copies += [(loop.copy(), reading)] * moments.count(k)
+        reading = loop.step().distances
+        loop.advance()
+        if progress is not None and k % 100 == 0:
+            progress(k, total)
+    if len(copies) < count:
+        raise ConfigurationError("run_matrix", "count", count, f"at most {len(copies)} moments for this run")
+    chosen = np.random.default_rng((seed, 1)).permutation(len(copies))[:count]
+    work = [(*copies[n], cases, seed + i) for i, n in enumerate(np.sort(chosen))]
+    done: list[list[tuple[Reaction, bool, float, float, float]]] = []
+    if jobs > 1 and "fork" in multiprocessing.get_all_start_methods():
+        _WORK[:] = work
+        with multiprocessing.get_context("fork").Pool(jobs) as pool:
+            for item in pool.imap(_inherited, range(count)):
+                done.append(item)
+                if progress is not None:
+                    progress(total - (count - len(done)) * (len(cases) + 1) * WINDOW, total)
+        _WORK.clear()
+    else:
+        for item in work:
+            done.append(_moment(*item))
+            if progress is not None:
+                progress(total - (count - len(done)) * (len(cases) + 1) * WINDOW, total)
+    return [_summary(case, [item[c] for item in done]) for c, case in enumerate(cases)]
+
+
+_WORK: list[tuple[FixedLoop, Array, Sequence[Case], int]] = []  # inherited by forked processes, never pickled
+
+
+def _inherited(n: int) -> list[tuple[Reaction, bool, float, float, float]]:
+    return _moment(*_WORK[n])
+
+
+def _summary(case: Case, rows: list[tuple[Reaction, bool, float, float, float]]) -> Result:
+    reactions = [row[0] for row in rows]
+    return Result(
+        case=case.name,
+        promise=case.promise,
+        within=case.within,
+        moments=len(rows),
+        applied=sum(r.applies for r in reactions),
+        slowest=max((r.tick or 0 for r in reactions if r.applies), default=0),
+        missing=sum(r.tick is None for r in reactions),
+        contacts=sum(row[1] for row in rows),
+        passed=max(row[2] for row in rows),
+        nearest=min(row[3] for row in rows),
+        nearest_healthy=min(row[4] for row in rows),
+    )
+
+
+def _moment(
+    loop: FixedLoop, before: Array, cases: Sequence[Case], seed: int
+) -> list[tuple[Reaction, bool, float, float, float]]:
+    """All cases at one moment: reaction, whether there was a new contact, excess over limits, distances."""
+    rng = np.random.default_rng(seed)
+    count = len(before)
+    twin = loop.copy()
+    healthy = _play(twin, np.zeros(0, dtype=np.intp), before, None)
+    quiet = min(record.gap for record in healthy)
+    results = []
+    for case in cases:
+        seeing = np.flatnonzero(np.isfinite(before))
+        first = int(rng.choice(seeing)) if len(seeing) else int(rng.integers(count))
+        number = max(round(case.share * count), 1)
+        others = rng.permutation(np.delete(np.arange(count), first))
+        sick = np.concatenate(([first], others[: number - 1])).astype(np.intp)
+        copy = loop.copy()
+        ticks = _play(copy, sick, before, case)
+        copy.controller.acknowledge()
+        sensing = copy.controller.sensing
+        assert sensing is not None
+        window = Window(
+            sick,
+            sensing.spots.names,
+            before,
+            healthy[0],
+            ticks,
+            sensing.health.severity,
+            copy.controller.rules,
+            copy.controller.dt,
+        )
+        gap = min(record.gap for record in ticks)
+        results.append((case.reaction(window), gap <= 0.0 < quiet, _excess(loop, ticks), gap, quiet))
+    return results
+
+
+def _play(loop: FixedLoop, sick: NDArray[np.intp], before: Array, case: Case | None) -> list[Record]:
+    """Go on for a window, the sick spots spoilt for as long as the case says."""
+    records: list[Record] = []
+    sensing, robot = loop.controller.sensing, loop.controller.robot
+    assert sensing is not None
+    anchor = None
+    for k in range(WINDOW):
+        fault = None
+        if case is not None and k < case.lasts:
+
+            def fault(distances: Array, case: Case = case) -> tuple[Array, Array]:
+                spoilt, ages = distances.copy(), np.zeros(len(distances))
+                spoilt[sick], ages[sick] = case.spoil(distances[sick], before[sick])
+                return spoilt, ages
+
+        moment = loop.step(fault)
+        tick = moment.tick
+        moved = 0.0
+        if len(sick) and np.isfinite(before[sick[0]]):
+            point = sensing.spots.points(moment.state, np.where(np.isfinite(before), before, 0.0))[sick[0]]
+            anchor = point if anchor is None else anchor
+            moved = float(np.linalg.norm(point - anchor))
+        records.append(
+            Record(
+                tick.status,
+                tick.severity,
+                tick.unseen,
+                sensing.counted,
+                tick.cdf_n,
+                wire_speed(tick.reference.qd, robot.at(tick.reference.q)),
+                tick.reference.q,
+                tick.reference.qd,
+                min(board_distance(loop.scene, loop.plant.data)[0], person_distance(loop.scene, loop.plant.data)[0]),
+                moved,
+            )
+        )
+        loop.advance()
+    return records
+
+
+def _excess(loop: FixedLoop, ticks: list[Record]) -> float:
+    """Largest excess over a joint limit of the references: position [rad], velocity and acceleration relative to it."""
+    robot, dt = loop.controller.robot, loop.controller.dt
+    q, qd = np.array([record.q for record in ticks]), np.array([record.qd for record in ticks])
+    position = max((robot.lower - q).max(), (q - robot.upper).max())
+    velocity = (np.abs(qd) / robot.max_velocity).max() - 1.0
+    acceleration = (np.abs(np.diff(qd, axis=0)) / (robot.max_acceleration * dt)).max() - 1.0
+    return float(max(position, velocity, acceleration))
