@@ -19,6 +19,9 @@ from qpsafe.tasks.task import Task
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
+#: A law that moves a joint by more than this in one tick is broken [rad].
+ABSURD_STEP = 1e3
+
 
 def default_activation(tasks: tuple[Task, ...]) -> Activation:
     """The source's thresholds: (18) for one task, (22) for two."""
@@ -88,6 +91,6 @@ def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> ND
     qd = np.asarray(result.qd)
     if qd.shape != q.shape or qd.dtype.kind not in "fiu":
         raise ValueError(f"the law returned a velocity of shape {qd.shape}, {qd.dtype}, expected {len(q)} real numbers")
-    if not np.isfinite(q + qd * dt).all():
-        raise ValueError("the law returned a velocity that is not finite")
+    if not (np.abs(qd) * dt < ABSURD_STEP).all():  # false for NaN; without limits nothing else would stop it
+        raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
     return np.array(qd, dtype=float)
