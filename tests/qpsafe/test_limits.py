@@ -93,7 +93,7 @@ def test_a_start_outside_comes_back_at_bounded_speed(outside: float, side: float
     limits = JointLimits([-1.0], [1.0], [3.0], [20.0], DT, return_speed=0.1)
     q, qd = np.array([side * (1.0 + outside)]), np.array([speed])
     settled = 0
-    for _ in range(4000):
+    for _ in range(6000):
         box = limits.box(q, qd)
         assert box.lower[0] <= box.upper[0]
         command = box.clip(np.array([side * 100.0]))  # the law pushes outwards all the time
