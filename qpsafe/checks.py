@@ -34,6 +34,15 @@ def default_activation(tasks: tuple[Task, ...]) -> Activation:
     )
 
 
+def checked_activation(tasks: tuple[Task, ...], activation: Activation | None) -> Activation:
+    """The given activation, or the default one, if it has as many thresholds as there are tasks."""
+    activation = default_activation(tasks) if activation is None else activation
+    if len(activation.thresholds) != len(tasks):
+        found = f"{len(activation.thresholds)} thresholds"
+        raise ConfigurationError("SafetyController", "activation", found, f"{len(tasks)}")
+    return activation
+
+
 def check_arguments(robot: Robot, tasks: Sequence[Task], law: Law | None, dt: float) -> None:
     """Refuse a configuration that cannot work, by name."""
     if not hasattr(robot, "wire_frames"):
@@ -47,9 +56,9 @@ def check_arguments(robot: Robot, tasks: Sequence[Task], law: Law | None, dt: fl
     for k, task in enumerate(tasks):
         if not isinstance(task, Task):
             raise ConfigurationError("SafetyController", f"tasks[{k}]", task, "a Task, e.g. PositionTask")
-        if task.frame not in robot.frame_names:
-            expected = "one of " + ", ".join(robot.frame_names)
-            raise ConfigurationError("SafetyController", f"tasks[{k}].frame", task.frame, expected)
+        misfit = task.misfit(robot)
+        if misfit is not None:
+            raise ConfigurationError("SafetyController", f"tasks[{k}].{misfit.key}", misfit.value, misfit.expected)
         if not task.gain * dt < 1.0:
             expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
             raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)

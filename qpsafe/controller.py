@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.checks import check_arguments, check_parts, checked_spots, checked_velocity, default_activation
+from qpsafe.checks import check_arguments, check_parts, checked_activation, checked_spots, checked_velocity
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
-from qpsafe.errors import ConfigurationError
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law, LawProblem, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.recovery import Recovery
+from qpsafe.recovery import Recovery, RecoveryRules
 from qpsafe.reference import JointReference
 from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
@@ -53,6 +52,7 @@ class SafetyController:
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
         barrier: A cap on the danger field, beyond the source; none by default.
+        recovery: How the robot returns to its path after danger.
 
     Raises:
         ConfigurationError: Names the argument that is wrong.
@@ -73,6 +73,7 @@ class SafetyController:
         sensing: SensingRules | None = None,
         known: Sequence[Obstacle] = (),
         barrier: DangerBarrier | None = None,
+        recovery: RecoveryRules | None = None,
     ) -> None:
         check_arguments(robot, tasks, law, dt)
         check_parts(robot, dt, field, activation, evasion, limits)
@@ -81,10 +82,7 @@ class SafetyController:
         self.law = HierarchicalLaw() if law is None else law
         self.dt = float(dt)
         self.field = DangerField() if field is None else field
-        self.activation = default_activation(self.tasks) if activation is None else activation
-        if len(self.activation.thresholds) != len(self.tasks):
-            found = len(self.activation.thresholds)
-            raise ConfigurationError("SafetyController", "activation", f"{found} thresholds", f"{len(self.tasks)}")
+        self.activation = checked_activation(self.tasks, activation)
         self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
         own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
         self.limits = own if isinstance(limits, str) else limits
@@ -93,11 +91,12 @@ class SafetyController:
         self.rules = SensingRules() if sensing is None else sensing
         self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known) if self.spots else None
         self.barrier = barrier
+        self.recovery_rules = RecoveryRules() if recovery is None else recovery
         self.reset()
 
     def reset(self) -> None:
         """Start anew: the next valid measurement sets the commanded configuration."""
-        self.recovery = Recovery(self.tasks, self.activation.suspend_above, self.dt)
+        self.recovery = Recovery(self.tasks, self.activation.suspend_above, self.dt, self.recovery_rules)
         self.evasion.reset()
         if self.sensing is not None:
             self.sensing.reset()
@@ -110,6 +109,35 @@ class SafetyController:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
         if self.sensing is not None:
             self.sensing.acknowledge()
+
+    def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
+        """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
+
+        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
+
+        Args:
+            tasks: What it is asked to do now, highest priority first.
+            activation: Their thresholds; by default the present ones if the number of tasks stays.
+            restart: Whether the trajectories' clock, and their events, start from zero; else it goes on.
+
+        Raises:
+            ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
+        """
+        check_arguments(self.robot, tasks, self.law, self.dt)
+        check_parts(self.robot, self.dt, None, activation, None, None)
+        if activation is None and len(tasks) == len(self.tasks):
+            activation = self.activation
+        activation = checked_activation(tuple(tasks), activation)
+        self.tasks, self.activation = tuple(tasks), activation
+        self.recovery.set_tasks(self.tasks, activation.suspend_above, restart)
+
+    def pause(self) -> None:
+        """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
+        self.recovery.paused = True
+
+    def resume(self) -> None:
+        """Let the path's clock run again."""
+        self.recovery.paused = False
 
     def step(
         self,
@@ -178,10 +206,10 @@ class SafetyController:
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         activations = self.activation.activations(cdf_n)
         commanded = self.robot.at(self._q)
-        samples = self.recovery.update(cdf_n, commanded.pose, activations)
+        samples = self.recovery.update(cdf_n, commanded, activations)
         tasks = []
         for task, sample in zip(self.tasks, samples, strict=True):
-            error = task.error(commanded.pose(task.frame), sample)
+            error = task.error(task.value(commanded), sample)
             tasks.append(TaskVelocity(task.jacobian(commanded), task.velocity(error, sample)))
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
@@ -221,6 +249,7 @@ class SafetyController:
             vectors=vectors,
             errors=errors,
             path_time=self.recovery.path_time,
+            events=self.recovery.take_events(),
             box=box,
             law=result,
             joint_names=self.robot.joint_names,
@@ -269,6 +298,6 @@ class SafetyController:
         return JointReference(self._seq, self._seq * self.dt, self._q.copy(), self._qd.copy(), self._active)
 
     def _errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:
-        """Errors against the tasks' own trajectories, not against a recovery move."""
+        """Errors against the tasks' own trajectories, not against the way back to them."""
         t = self.recovery.path_time
-        return tuple(task.error(state.pose(task.frame), task.trajectory.sample(t)) for task in self.tasks)
+        return tuple(task.error(task.value(state), task.trajectory.sample(t)) for task in self.tasks)

@@ -1,4 +1,4 @@
-"""Suspension and recovery of the task's path, section IV-C of the source.
+"""Suspension and recovery of the tasks' path, section IV-C of the source, as one small state machine.
 
 following ──danger above Δ(1-ε)──> suspended ──danger below──> recovering ──back at x_d,s──> following
                                         ^────────danger above────────┘
@@ -6,114 +6,257 @@ following ──danger above Δ(1-ε)──> suspended ──danger below──>
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import ConfigurationError
+
 if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
-    from qpsafe.tasks.trajectory import Sample, SmoothMove
 
 FOLLOWING, SUSPENDED, RECOVERING = "following", "suspended", "recovering"
 
 
-class Recovery:
-    """Clock of the task's path, and the references that lead back to it.
+@dataclass(frozen=True)
+class RecoveryRules:
+    """How the robot returns to its path, and when it counts as returned.
 
-    While suspended the path's clock stands still, x_d = x_d,s, ẋ_d = 0. When danger is past, a smooth move leads each
-    frame from its pose then, x_d,r, to x_d,s. The path goes on when the moves have ended and every fully active task
-    is back within `tolerance`.
+    Attributes:
+        speed, angular_speed, joint_speed: Peak speed of a return [m/s], [rad/s], [rad/s].
+        shortest: Least duration of a return [s], so that small ones stay gentle.
+        tolerance: Largest error norm at which a task counts as met [m or rad].
+        ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
+        enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
+
+    Raises:
+        ConfigurationError: A value is not a finite number > 0.
+    """
+
+    speed: float = 0.25
+    angular_speed: float = 0.8
+    joint_speed: float = 0.8
+    shortest: float = 0.4
+    tolerance: float = 5e-4
+    ramp: float = 0.2
+    enabled: bool = True
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.name != "enabled" and not (isinstance(value, int | float) and 0.0 < value < math.inf):
+                raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
+
+    def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
+        """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
+        if joints:
+            mean = float(np.abs(offset).max()) / self.joint_speed
+        else:
+            shift, turn = float(np.linalg.norm(offset[:3])), float(np.linalg.norm(offset[3:]))
+            mean = max(shift / self.speed, turn / self.angular_speed)
+        return max(15.0 / 8.0 * mean, self.shortest)
+
+
+@dataclass(frozen=True, eq=False)
+class Return:
+    """The way back of one task: its offset from the reference, which fades by minimum jerk.
+
+    Attributes:
+        offset: At the start (6,) or (n,).
+        duration: [s].
+        time: Since the start [s].
+    """
+
+    offset: NDArray[np.float64]
+    duration: float
+    time: float = 0.0
+
+    def displace(self, sample: Any) -> Any:
+        """The reference with what is left of the offset."""
+        s, ds = minimum_jerk(self.time / self.duration)
+        return sample.displaced(self.offset, 1.0 - s, -ds / self.duration)
+
+
+class Recovery:
+    """Clock of the tasks' path, and the references that lead back to it.
+
+    While suspended the clock stands still: x_d = x_d,s, ẋ_d = 0. When danger is past, every task returns smoothly from
+    where it is then, x_d,r, to x_d,s. A task that is still released (a_k < 1) is not pulled: its return begins when it
+    is fully active again, be it after the path has gone on. The path goes on when every fully active task has
+    returned; its clock then comes to speed within `ramp`.
 
     Args:
         tasks: The controller's tasks, highest priority first.
         suspend_above: Δ(1-ε), the danger beyond which the path is suspended.
         dt: Tick [s].
-        speed: Peak speed of the recovery move [m/s].
-        angular_speed: Peak angular speed of the recovery move [rad/s].
-        tolerance: Largest error norm of a task at which it counts as recovered [m or rad].
+        rules: How to return.
     """
 
     def __init__(
-        self,
-        tasks: Sequence[Task],
-        suspend_above: float,
-        dt: float,
-        speed: float = 0.25,
-        angular_speed: float = 0.8,
-        tolerance: float = 2e-3,
+        self, tasks: Sequence[Task], suspend_above: float, dt: float, rules: RecoveryRules | None = None
     ) -> None:
-        self.tasks = tuple(tasks)
-        self.suspend_above = suspend_above
         self.dt = dt
-        self.speed, self.angular_speed, self.tolerance = speed, angular_speed, tolerance
+        self.rules = RecoveryRules() if rules is None else rules
         self.phase = FOLLOWING
         self.path_time = 0.0
-        self._moves: dict[tuple[str, int], SmoothMove] = {}
-        self._move_time = 0.0
+        self.paused = False
+        self._rate = 1.0  # of the clock
+        self._changed = False
+        self.set_tasks(tasks, suspend_above, restart=True)
+        self._changed = False
+
+    def set_tasks(self, tasks: Sequence[Task], suspend_above: float, restart: bool) -> None:
+        """Take other tasks from the next tick on; where they are not met, the robot returns to them smoothly.
+
+        Args:
+            tasks: Highest priority first.
+            suspend_above: As for the class.
+            restart: Whether the clock, and the events with it, starts from zero.
+        """
+        kept = {} if restart else {id(cursor.trajectory): cursor for cursor in self._cursors}
+        if restart:
+            self.path_time = 0.0
+        self.tasks = tuple(tasks)
+        self.suspend_above = suspend_above
+        self._returns: list[Return | None] = [None] * len(self.tasks)
+        self._pending = [self.phase != FOLLOWING] * len(self.tasks)
+        self._changed = True
+        trajectories = {id(task.trajectory): task.trajectory for task in self.tasks}
+        self._cursors = [
+            kept.get(key) or _Cursor(trajectory, self.path_time)
+            for key, trajectory in trajectories.items()
+            if hasattr(trajectory, "event")
+        ]
 
     @property
-    def clocks(self) -> tuple[float, float]:
-        """Times on the path and on the recovery move [s]; set them back when the robot could not go along."""
-        return self.path_time, self._move_time
+    def clocks(self) -> tuple:
+        """Times on the path and on the returns; set them back when the robot could not go along."""
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending)
 
     @clocks.setter
-    def clocks(self, clocks: tuple[float, float]) -> None:
-        self.path_time, self._move_time = clocks
+    def clocks(self, clocks: tuple) -> None:
+        self.path_time, self._rate = clocks[:2]
+        self._returns, self._pending = list(clocks[2]), list(clocks[3])
 
-    def update(
-        self, cdf_n: float, pose: Callable[[str], NDArray[np.float64]], activations: tuple[float, ...]
-    ) -> tuple[Sample, ...]:
+    def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
         """Advance one tick and give each task its reference.
 
         Args:
             cdf_n: Danger now.
-            pose: Commanded pose (4, 4) of a frame.
+            state: Commanded configuration.
             activations: a_1..a_N, one per task.
 
         Returns:
             One sample per task, in their order.
+
+        Raises:
+            ValueError: A trajectory is not finite; the phase stays as it was.
         """
-        if not cdf_n <= self.suspend_above:
-            self.phase = SUSPENDED
+        values = [task.value(state) for task in self.tasks]
+        self._next_phase(cdf_n, values, activations)
+        return tuple(
+            self._reference(k, value, active) for k, (value, active) in enumerate(zip(values, activations, strict=True))
+        )
+
+    def take_events(self) -> tuple[str, ...]:
+        """Names of the events that the path has passed since they were last taken, each once, in their order."""
+        found: list[tuple[float, str]] = []
+        for cursor in self._cursors:
+            found.extend(cursor.take(self.path_time))
+        return tuple(name for _, name in sorted(found, key=lambda event: event[0]))
+
+    def _next_phase(self, cdf_n: float, values: list, activations: tuple[float, ...]) -> None:
+        if self._changed:
+            self._changed = False
+            if self.phase == FOLLOWING and not self._met(values, (1.0,) * len(values)):
+                self._suspend()
+        if not cdf_n <= self.suspend_above and self.rules.enabled:
+            self._suspend()
         elif self.phase == SUSPENDED:
-            self._start_moves(pose)
+            for task in self.tasks:
+                if not task.trajectory.sample(self.path_time).finite:  # stay suspended, try again at the next tick
+                    raise ValueError(f"the trajectory of the {task.name} task is not finite")
             self.phase = RECOVERING
         elif self.phase == RECOVERING:
-            self._move_time += self.dt
-            if self._recovered(pose, activations):
+            if self._returned(activations) and self._met(values, activations):
                 self.phase = FOLLOWING
         else:
-            self.path_time += self.dt
-        return tuple(self._sample(task) for task in self.tasks)
+            self._advance(values)
 
-    def _start_moves(self, pose: Callable[[str], NDArray[np.float64]]) -> None:
-        from qpsafe.tasks.trajectory import SmoothMove
+    def _suspend(self) -> None:
+        self.phase, self._rate = SUSPENDED, 0.0
+        self._returns = [None] * len(self.tasks)
+        self._pending = [True] * len(self.tasks)
 
-        self._move_time = 0.0
-        self._moves = {}
-        for task in self.tasks:
-            key = (task.frame, id(task.trajectory))
-            if key not in self._moves:  # tasks on one path of one frame share one move
-                goal = task.trajectory.sample(self.path_time).pose
-                if not np.isfinite(goal).all():  # a move would keep it: stay suspended, try again at the next tick
-                    raise ValueError(f"the trajectory of the {task.name} task is not finite")
-                self._moves[key] = SmoothMove(pose(task.frame), goal, self.speed, self.angular_speed)
+    def _advance(self, values: list) -> None:
+        """Let the clock run, at an event only when the tasks are met: no grip beside the part."""
+        step = self.dt / self.rules.ramp
+        self._rate = max(self._rate - step, 0.0) if self.paused else min(self._rate + step, 1.0)
+        ahead = self.path_time + self._rate * self.dt
+        if any(cursor.due(ahead) for cursor in self._cursors) and not self._met(values, (1.0,) * len(values)):
+            return
+        self.path_time = ahead
 
-    def _sample(self, task: Task) -> Sample:
-        if self.phase == RECOVERING:
-            return self._moves[task.frame, id(task.trajectory)].sample(self._move_time)
+    def _reference(self, k: int, value: NDArray[np.float64], active: float) -> Any:
+        task = self.tasks[k]
         sample = task.trajectory.sample(self.path_time)
-        if self.phase == SUSPENDED:
-            return sample._replace(twist=np.zeros(6))
-        return sample
+        if self.phase != FOLLOWING or self._rate < 1.0:
+            sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
+        if self.phase == SUSPENDED or not self._pending[k]:
+            return sample
+        back = self._returns[k]
+        if back is None or not active >= 1.0:  # x_d,r is where the task is when it may return
+            offset = sample.offset(value)
+            back = Return(offset, self.rules.duration(offset, value.ndim == 1))
+        else:
+            back = replace(back, time=back.time + self.dt)
+        self._returns[k] = back
+        if back.time >= back.duration:
+            self._returns[k], self._pending[k] = None, False
+            return sample
+        return back.displace(sample)
 
-    def _recovered(self, pose: Callable[[str], NDArray[np.float64]], activations: tuple[float, ...]) -> bool:
-        if any(self._move_time < move.duration for move in self._moves.values()):
-            return False
-        for task, activation in zip(self.tasks, activations, strict=True):
-            error = task.error(pose(task.frame), task.trajectory.sample(self.path_time))
-            if activation >= 1.0 and not float(np.linalg.norm(error)) <= self.tolerance:
-                return False
+    def _returned(self, activations: tuple[float, ...]) -> bool:
+        return not any(pending and active >= 1.0 for pending, active in zip(self._pending, activations, strict=True))
+
+    def _met(self, values: list, activations: tuple[float, ...]) -> bool:
+        """Whether every essential and fully active task is on the path, within the tolerance."""
+        for task, value, active in zip(self.tasks, values, activations, strict=True):
+            if task.essential and active >= 1.0:
+                error = task.error(value, task.trajectory.sample(self.path_time))
+                if not float(np.linalg.norm(error)) <= self.rules.tolerance:
+                    return False
         return True
+
+
+class _Cursor:
+    """Which event of a trajectory comes next; it only ever moves forward."""
+
+    def __init__(self, trajectory: Any, time: float) -> None:
+        self.trajectory = trajectory
+        self.count = 0
+        while self.due(time, strictly=True):
+            self.count += 1
+
+    def due(self, time: float, strictly: bool = False) -> bool:
+        event = self.trajectory.event(self.count)
+        return event is not None and (event.time < time if strictly else event.time <= time)
+
+    def take(self, time: float) -> list[tuple[float, str]]:
+        found = []
+        while self.due(time):
+            event = self.trajectory.event(self.count)
+            found.append((event.time, event.name))
+            self.count += 1
+        return found
+
+
+def minimum_jerk(tau: float) -> tuple[float, float]:
+    """s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ and ds/dτ for τ in [0, 1]: from rest to rest."""
+    tau = min(max(tau, 0.0), 1.0)
+    return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2

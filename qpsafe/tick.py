@@ -46,6 +46,7 @@ class Tick:
         vectors: Danger vectors (6) at the points, (p, 3).
         errors: Task errors of the commanded pose against the tasks' own trajectories, per task (rows,).
         path_time: Clock of the tasks' trajectories [s].
+        events: Names of the events that the tasks' programs reached at this tick, e.g. ``grip``.
         box: Admissible joint velocities of this tick; None without limits.
         law: What the law answered, with the solution of every regime; None if it was not asked.
         severity: Of sick sensors, until acknowledged: ``clear``, ``capped`` (speed) or ``stopped``.
@@ -69,6 +70,7 @@ class Tick:
     vectors: NDArray[np.float64] = field(default_factory=_no_vectors)
     errors: tuple[NDArray[np.float64], ...] = ()
     path_time: float = 0.0
+    events: tuple[str, ...] = ()
     box: Box | None = None
     law: LawResult | None = None
     severity: str = "clear"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.tasks.task import Task
+from qpsafe.tasks.task import PoseTask
 from qpsafe.tasks.trajectory import Sample, Trajectory
 
 
-class PositionTask(Task):
+class PositionTask(PoseTask):
     """Keep the origin of a frame on its trajectory: e = x_d - x, world frame [m].
 
     Args:
@@ -24,6 +24,6 @@ class PositionTask(Task):
     def __init__(self, frame: str, trajectory: Trajectory, gain: float = 1.0) -> None:
         super().__init__(frame, trajectory, gain)
 
-    def error(self, pose: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
+    def error(self, value: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """x_d - x (3,) [m]."""
-        return sample.pose[:3, 3] - pose[:3, 3]
+        return sample.pose[:3, 3] - value[:3, 3]

@@ -32,3 +32,20 @@ def euler_zyx(R: NDArray[np.float64]) -> NDArray[np.float64]:
     theta = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
     psi = np.arctan2(R[..., 2, 1], R[..., 2, 2])
     return np.stack((phi, theta, psi), axis=-1)
+
+
+def euler_difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """a - b of angles, wrapped to (-pi, pi], same shape [rad]."""
+    return np.pi - np.mod(np.pi - (a - b), 2.0 * np.pi)
+
+
+def euler_zyx_rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """E⁻¹ (3, 3) at the orientation R (3, 3): angular velocity in world axes to rates of `euler_zyx`'s φ, θ, ψ.
+
+    ω = φ̇ z + θ̇ y' + ψ̇ x''. With y' and x'' from R, cos θ = 0 makes the matrix infinite: it is limited to 1e6 there.
+    """
+    phi, theta, _ = euler_zyx(R)
+    s, c = np.sin(phi), np.cos(phi)
+    cos = np.copysign(max(abs(np.cos(theta)), 1e-6), np.cos(theta))
+    tan = np.sin(theta) / cos
+    return np.array([[c * tan, s * tan, 1.0], [-s, c, 0.0], [c / cos, s / cos, 0.0]])

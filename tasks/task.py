@@ -1,10 +1,10 @@
-"""A task: a frame, the trajectory it should follow, and its closed-loop inverse kinematics (CLIK)."""
+"""A task: what it controls, the trajectory that should follow, and its closed-loop inverse kinematics (CLIK)."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,46 +13,98 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.trajectory import Sample, Trajectory
 
 if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
+
+
+class Misfit(NamedTuple):
+    """What a robot cannot do for a task: the argument, its value, and what would fit."""
+
+    key: str
+    value: object
+    expected: str
 
 
 class Task(ABC):
     """Something the robot is asked to do, at one priority.
 
-    CLIK (section IV-B.4): ẋ = ẋ_d + K e, closed on the commanded configuration.
+    A task controls a value x(q): a pose or joint positions. Its error e(x, x_d) and its Jacobian J belong together:
+    with the reference at rest where the robot is, ė = -J q̇. CLIK (section IV-B.4) asks for J q̇ = ẋ_d + K e, closed on
+    the commanded configuration.
 
     Args:
-        frame: Frame of the robot that is to follow the trajectory.
-        trajectory: Where it should be.
+        trajectory: Where the value should be.
         gain: K [1/s]; 0 < K dt < 1 for a stable discrete loop.
 
     Raises:
         ConfigurationError: The gain is not a positive finite number.
     """
 
-    #: Rows of the geometric Jacobian that the task uses, linear before angular.
-    rows: tuple[int, ...]
     #: Name shown in reports.
     name: str
+    #: Frames the value is made of.
+    frames: tuple[str, ...] = ()
+    #: Whether a path waits, at its events and after a suspension, until this task is met.
+    essential: bool = True
 
-    def __init__(self, frame: str, trajectory: Trajectory, gain: float) -> None:
+    def __init__(self, trajectory: Trajectory, gain: float) -> None:
         if not (math.isfinite(gain) and gain > 0.0):
             raise ConfigurationError(type(self).__name__, "gain", gain, "a finite number > 0 [1/s]")
-        self.frame = frame
         self.trajectory = trajectory
         self.gain = float(gain)
+
+    @abstractmethod
+    def value(self, state: RobotState) -> NDArray[np.float64]:
+        """What the task controls, x: a pose (4, 4) or joint positions (n,)."""
+
+    @abstractmethod
+    def error(self, value: NDArray[np.float64], sample: Any) -> NDArray[np.float64]:
+        """Error e (rows,) of a value against a sample of the trajectory; zero when the task is met."""
+
+    @abstractmethod
+    def jacobian(self, state: RobotState) -> NDArray[np.float64]:
+        """Task Jacobian J (rows, n)."""
+
+    @abstractmethod
+    def velocity(self, error: NDArray[np.float64], sample: Any) -> NDArray[np.float64]:
+        """CLIK velocity ẋ_d + K e, (rows,)."""
+
+    def misfit(self, robot: Robot) -> Misfit | None:
+        """Why `robot` cannot do this task, None if it can."""
+        for frame in self.frames:
+            if frame not in robot.frame_names:
+                return Misfit("frame", frame, "one of " + ", ".join(robot.frame_names))
+        return None
+
+
+class PoseTask(Task):
+    """A task on the pose of one frame.
+
+    Args:
+        frame: Frame of the robot that is to follow the trajectory.
+        trajectory: Where it should be.
+        gain: K [1/s].
+    """
+
+    #: Rows of the geometric Jacobian that the task uses, linear before angular.
+    rows: tuple[int, ...]
+
+    def __init__(self, frame: str, trajectory: Trajectory, gain: float) -> None:
+        super().__init__(trajectory, gain)
+        self.frame = frame
+        self.frames = (frame,)
         first, last = self.rows[0], self.rows[-1]
         contiguous = self.rows == tuple(range(first, last + 1))
         self._rows = slice(first, last + 1) if contiguous else list(self.rows)  # a slice is the quicker one
 
-    @abstractmethod
-    def error(self, pose: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
-        """Error e (rows,) from the actual pose (4, 4) to the sample; zero when the task is met."""
+    def value(self, state: RobotState) -> NDArray[np.float64]:
+        """Pose of the frame (4, 4), world frame [m]."""
+        return state.pose(self.frame)
 
     def jacobian(self, state: RobotState) -> NDArray[np.float64]:
-        """Task Jacobian (rows, n): the time derivative of what the task controls."""
+        """Rows of the geometric Jacobian (rows, n), world axes."""
         return state.jacobian(self.frame)[self._rows]
 
     def velocity(self, error: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
-        """CLIK velocity ẋ = ẋ_d + K e, (rows,)."""
+        """CLIK velocity ẋ_d + K e, (rows,)."""
         return sample.twist[self._rows] + self.gain * error

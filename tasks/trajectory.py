@@ -1,8 +1,8 @@
-"""References over time: where a frame should be, as a pose and a twist."""
+"""References over time: where a pose or the joints should be, and how fast they should move."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from qpsafe.tasks.rotation import exp3, is_rotation, log3
 
 
 class Sample(NamedTuple):
-    """A reference at one instant.
+    """A reference pose at one instant.
 
     Attributes:
         pose: x_d as a homogeneous matrix (4, 4), world frame [m].
@@ -22,12 +22,63 @@ class Sample(NamedTuple):
     pose: NDArray[np.float64]
     twist: NDArray[np.float64]
 
+    @property
+    def finite(self) -> bool:
+        """Whether the reference can be followed at all."""
+        return bool(np.isfinite(self.pose).all() and np.isfinite(self.twist).all())
+
+    def slowed(self, rate: float) -> Sample:
+        """The same reference on a clock that runs `rate` times as fast."""
+        return Sample(self.pose, rate * self.twist)
+
+    def offset(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far a pose is from the reference: shift, then rotation vector, world axes (6,) [m, rad]."""
+        return np.concatenate((value[:3, 3] - self.pose[:3, 3], log3(value[:3, :3] @ self.pose[:3, :3].T)))
+
+    def displaced(self, offset: NDArray[np.float64], share: float, rate: float) -> Sample:
+        """The reference moved by `share` of an offset, while that share changes by `rate` [1/s]."""
+        turn = exp3(share * offset[3:])
+        pose = np.eye(4)
+        pose[:3, 3] = self.pose[:3, 3] + share * offset[:3]
+        pose[:3, :3] = turn @ self.pose[:3, :3]
+        angular = turn @ self.twist[3:] + rate * offset[3:]
+        return Sample(pose, np.concatenate((self.twist[:3] + rate * offset[:3], angular)))
+
+
+class JointSample(NamedTuple):
+    """Reference joint positions at one instant.
+
+    Attributes:
+        position: q_d (n,) [rad].
+        velocity: q̇_d (n,) [rad/s].
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    @property
+    def finite(self) -> bool:
+        """Whether the reference can be followed at all."""
+        return bool(np.isfinite(self.position).all() and np.isfinite(self.velocity).all())
+
+    def slowed(self, rate: float) -> JointSample:
+        """The same reference on a clock that runs `rate` times as fast."""
+        return JointSample(self.position, rate * self.velocity)
+
+    def offset(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far joint positions are from the reference (n,) [rad]."""
+        return value - self.position
+
+    def displaced(self, offset: NDArray[np.float64], share: float, rate: float) -> JointSample:
+        """The reference moved by `share` of an offset, while that share changes by `rate` [1/s]."""
+        return JointSample(self.position + share * offset, self.velocity + rate * offset)
+
 
 class Trajectory(Protocol):
-    """A reference pose over time."""
+    """A reference over time; it keeps no clock, so a clock that stands still pauses it exactly."""
 
-    def sample(self, t: float) -> Sample:
-        """Reference at time t >= 0 [s] on the trajectory's own clock, which stands still while suspended."""
+    def sample(self, t: float) -> Any:
+        """`Sample` or `JointSample` at time t >= 0 [s] on the tasks' clock, which stands still while suspended."""
         ...
 
 
@@ -49,47 +100,35 @@ class FixedPose:
         return Sample(self.pose, np.zeros(6))
 
 
-class SmoothMove:
-    """Straight move between two poses, at rest at both ends, used to recover (section IV-C).
-
-    Position follows the line, orientation the shortest rotation, both with the minimum-jerk time law
-    s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵, whose peak speed is 15/8 of the mean.
+class FixedJoints:
+    """Joint positions that do not move.
 
     Args:
-        start: Pose at t = 0, (4, 4).
-        goal: Pose at t = duration, (4, 4).
-        speed: Peak speed of the origin [m/s].
-        angular_speed: Peak angular speed [rad/s].
-        minimum_duration: Shortest duration [s], so that small moves stay gentle.
+        position: (n,) [rad].
+
+    Raises:
+        ConfigurationError: They are not finite numbers.
     """
 
-    def __init__(
-        self,
-        start: NDArray[np.float64],
-        goal: NDArray[np.float64],
-        speed: float = 0.25,
-        angular_speed: float = 0.8,
-        minimum_duration: float = 0.4,
-    ) -> None:
-        self.start, self.goal = start, goal
-        self._shift = goal[:3, 3] - start[:3, 3]
-        self._turn = log3(goal[:3, :3] @ start[:3, :3].T)  # world frame
-        peak = 15.0 / 8.0
-        self.duration = max(
-            peak * float(np.linalg.norm(self._shift)) / speed,
-            peak * float(np.linalg.norm(self._turn)) / angular_speed,
-            minimum_duration,
-        )
+    def __init__(self, position: ArrayLike) -> None:
+        self.position = checked_vector("FixedJoints", "position", position)
 
-    def sample(self, t: float) -> Sample:
-        """Reference at time t [s]; the goal, at rest, from `duration` on."""
-        tau = min(max(t / self.duration, 0.0), 1.0)
-        s = tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
-        ds = 30.0 * tau**2 * (1.0 - tau) ** 2 / self.duration
-        pose = np.eye(4)
-        pose[:3, 3] = self.start[:3, 3] + s * self._shift
-        pose[:3, :3] = exp3(s * self._turn) @ self.start[:3, :3]
-        return Sample(pose, ds * np.concatenate((self._shift, self._turn)))
+    def sample(self, t: float) -> JointSample:
+        """The same positions at every time, at rest."""
+        return JointSample(self.position, np.zeros_like(self.position))
+
+
+def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = None) -> NDArray[np.float64]:
+    """`vector` as a read-only (n,) array of finite numbers, or a ConfigurationError that says what is wrong."""
+    expected = f"{'some' if size is None else size} finite numbers"
+    try:
+        array = np.array(vector, dtype=float)
+    except (TypeError, ValueError):
+        raise ConfigurationError(where, key, vector, expected) from None
+    if array.ndim != 1 or array.size == 0 or size not in (None, array.size) or not np.isfinite(array).all():
+        raise ConfigurationError(where, key, vector, expected)
+    array.setflags(write=False)
+    return array
 
 
 def checked_pose(where: str, key: str, pose: ArrayLike) -> NDArray[np.float64]:

@@ -98,7 +98,7 @@ def test_the_path_waits_for_a_robot_that_a_fault_holds(run: Any) -> None:
                 loop.step()
         assert loop.controller.recovery.phase == phase
         clocks = loop.controller.recovery.clocks
-        assert max(clocks) > 0.0
+        assert clocks[0] > 0.0
         law.spoilt = True
         for _ in range(200):
             assert loop.step().status == "fault"

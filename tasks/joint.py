@@ -1,0 +1,82 @@
+"""Joints on a trajectory of their own, and a posture to come back to where nothing else is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.tasks.task import Misfit, Task
+from qpsafe.tasks.trajectory import FixedJoints, JointSample, Trajectory
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+    from qpsafe.robot.state import RobotState
+
+
+class JointTask(Task):
+    """Keep joints on a trajectory: e = q_d - q [rad].
+
+    Args:
+        trajectory: Of all n joints; its samples are `JointSample`s.
+        gain: K [1/s].
+        joints: Which joints, from 0; None for all.
+
+    Raises:
+        ConfigurationError: Joints that are none, or a bad gain.
+    """
+
+    name = "joint"
+
+    def __init__(self, trajectory: Trajectory, gain: float = 5.0, joints: Sequence[int] | None = None) -> None:
+        super().__init__(trajectory, gain)
+        good = joints is None or (len(joints) > 0 and len(set(joints)) == len(joints) and min(joints) >= 0)
+        if not good:
+            raise ConfigurationError(type(self).__name__, "joints", joints, "different numbers from 0, or None")
+        self.joints = None if joints is None else [int(joint) for joint in joints]
+
+    def value(self, state: RobotState) -> NDArray[np.float64]:
+        """All joint positions (n,) [rad]."""
+        return state.q
+
+    def error(self, value: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
+        """q_d - q of the chosen joints [rad]."""
+        error = sample.position - value
+        return error if self.joints is None else error[self.joints]
+
+    def jacobian(self, state: RobotState) -> NDArray[np.float64]:
+        """Rows of the identity."""
+        identity = np.eye(len(state.q))
+        return identity if self.joints is None else identity[self.joints]
+
+    def velocity(self, error: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
+        """q̇_d + K e of the chosen joints [rad/s]."""
+        velocity = sample.velocity if self.joints is None else sample.velocity[self.joints]
+        return velocity + self.gain * error
+
+    def misfit(self, robot: Robot) -> Misfit | None:
+        """Joints the robot does not have, a trajectory of another number of joints."""
+        if self.joints is not None and max(self.joints) >= robot.nq:
+            return Misfit("joints", self.joints, f"below {robot.nq}")
+        sample = self.trajectory.sample(0.0)
+        if not isinstance(sample, JointSample) or sample.position.shape != (robot.nq,):
+            return Misfit("trajectory", self.trajectory, f"a trajectory of {robot.nq} joints")
+        return None
+
+
+class PostureTask(JointTask):
+    """Draw all joints to a posture, as far as the tasks above leave freedom; nothing waits for it.
+
+    Args:
+        posture: (n,) [rad].
+        gain: K [1/s].
+    """
+
+    name = "posture"
+    essential = False
+
+    def __init__(self, posture: ArrayLike, gain: float = 1.0) -> None:
+        super().__init__(FixedJoints(posture), gain)
