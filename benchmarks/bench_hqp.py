@@ -206,8 +206,10 @@ def run(name: str, cases: list[Case], repeats: int) -> dict[str, Any]:
     }
 
 
-def bench(count: int = 900, ticks: int = 1000, repeats: int = 5, seed: int = 0) -> dict[str, Any]:
-    """Run all solvers on `count` random problems and on a drifting sequence of `ticks`."""
+def bench(
+    count: int = 900, ticks: int = 1000, repeats: int = 5, seed: int = 0, solvers: tuple[str, ...] = tuple(SOLVERS)
+) -> dict[str, Any]:
+    """Run the solvers on `count` random problems and on a drifting sequence of `ticks`."""
     random = [prepare(problem) for problem in family(count, seed)]
     sequence = [prepare(problem) for problem in drift(ticks, seed)]
     return {
@@ -216,8 +218,8 @@ def bench(count: int = 900, ticks: int = 1000, repeats: int = 5, seed: int = 0) 
         "kinds": list(KINDS),
         "ticks": ticks,
         "repeats": repeats,
-        "random": [run(name, random, 2 if name in SLOW else repeats) for name in SOLVERS],
-        "drift": [run(name, sequence, 2 if name in SLOW else repeats) for name in SOLVERS],
+        "random": [run(name, random, 2 if name in SLOW else repeats) for name in solvers],
+        "drift": [run(name, sequence, 2 if name in SLOW else repeats) for name in solvers],
     }
 
 
@@ -239,11 +241,15 @@ def main() -> None:
     parser.add_argument("--ticks", type=int, default=1000, help="ticks of the drifting sequence")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--only", choices=SOLVERS, nargs="+", default=list(SOLVERS), metavar="SOLVER", help="of: %(choices)s"
+    )
     parser.add_argument("--json", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     from qpsafe.timing import machine
 
-    result = {"machine": machine(), **bench(arguments.count, arguments.ticks, arguments.repeats, arguments.seed)}
+    a = arguments
+    result = {"machine": machine(), **bench(a.count, a.ticks, a.repeats, a.seed, tuple(a.only))}
     print(", ".join(f"{key} {value}" for key, value in result["machine"].items()))
     report(
         f"{result['problems']} random problems, {result['well_conditioned']} well-conditioned [µs]", result["random"]

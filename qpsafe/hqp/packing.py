@@ -49,24 +49,25 @@ def pack(
     """Copy the problem into arrays: whole lists at once where all is plain, through `as_levels` where it is not."""
     if type(levels) is not list:
         levels = list(levels)
-    if rows is not None:
-        levels = [Level(*rows), *as_levels(levels)]
-    if not levels:
+    hard = None if rows is None else Level(*rows)
+    if not levels and hard is None:
         return _without_levels(lower, upper)
     plain, weight = False, None
-    if type(levels[0]) is not Level:  # pairs (A, b), perhaps
+    if levels and type(levels[0]) is not Level:  # pairs (A, b), perhaps
         try:
             matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]
+            highs = lows
+            if hard is not None:
+                matrices, lows, highs = (hard.A, *matrices), (hard.lower, *lows), (hard.upper, *highs)
             matrix, low = np.concatenate(matrices), np.concatenate(lows)
+            high = low if hard is None else np.concatenate(highs)
             counts = list(map(len, matrices))
             plain = matrix.dtype is low.dtype is _FLOAT and counts == list(map(len, lows))
             plain = plain and matrix.ndim == 2 and low.ndim == 1
         except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
             pass
-    if plain:
-        high = low
-    else:
-        matrix, low, high, weight, counts = _stack(as_levels(levels))
+    if not plain:
+        matrix, low, high, weight, counts = _stack(as_levels(levels if hard is None else [hard, *levels]))
     if not matrix.flags.c_contiguous:
         matrix = np.ascontiguousarray(matrix)
     n = matrix.shape[1]
