@@ -6,19 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.compiled import entry, readable
 from qpsafe.robot.wire import Wire
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-
-
-# p @ _SKEW is the matrix of p x, row by row
-_SKEW = np.zeros((3, 9))
-_SKEW[0, [5, 7]] = -1.0, 1.0
-_SKEW[1, [2, 6]] = 1.0, -1.0
-_SKEW[2, [1, 3]] = -1.0, 1.0
 
 
 class RobotState:
@@ -83,10 +78,11 @@ class RobotState:
             ConfigurationError: qd has the wrong shape.
         """
         qd = self.robot.joint_vector(qd, "qd")
-        ends = self._wire_ends()
-        velocities = self.wire_jacobians() @ qd
+        ends, jacobians = self._wire_ends(), self.wire_jacobians()
         starts, stops = self.robot.wire_indices
-        return Wire(ends[starts], ends[stops], velocities[starts], velocities[stops])
+        parts = np.empty((4, len(starts), 3))
+        _segments(ends, jacobians, qd, starts, stops, parts)
+        return Wire(*parts)
 
     def wire_jacobians(self) -> NDArray[np.float64]:
         """Linear Jacobians of the frames that end segments of the wire, (k, 3, n), as in `robot.wire_end_frames`.
@@ -95,9 +91,9 @@ class RobotState:
         Computed once a state and read-only.
         """
         if self._jacobians is None:
-            linear, angular = self._data.J[:3], self._data.J[3:]  # joint axes' twists at the world's origin
-            skew = (self._wire_ends() @ _SKEW).reshape(-1, 3, 3)  # p x
-            jacobians = (linear - skew @ angular) * self.robot.wire_support  # v(p) = v(0) - p x omega
+            ends = self._wire_ends()
+            jacobians = np.empty((len(ends), 3, self.robot.nq))
+            _point_jacobians(self._data.J, ends, self.robot.wire_support, jacobians)
             jacobians.flags.writeable = False
             self._jacobians = jacobians
         return self._jacobians
@@ -106,3 +102,35 @@ class RobotState:
         if self._ends is None:
             self._ends = np.array([self._placements[index].homogeneous[:3, 3] for index in self.robot.wire_end_ids])
         return self._ends
+
+
+_places = types.Array(types.int64, 1, "A", readonly=True)
+
+
+@entry(types.void(readable(2), readable(2), readable(3), types.float64[:, :, ::1]))
+def _point_jacobians(J, points, support, result):  # type: ignore[no-untyped-def]
+    """Linear Jacobians of points (k, 3) from the joint axes' twists (v, ω) at the world's origin, J (6, n).
+
+    Joint j moves the point p by v + ω × p if it moves the point at all, support (k, 1, n).
+    """
+    for k in range(points.shape[0]):
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        for j in range(J.shape[1]):
+            on = support[k, 0, j]
+            result[k, 0, j] = on * (J[0, j] + J[4, j] * z - J[5, j] * y)
+            result[k, 1, j] = on * (J[1, j] + J[5, j] * x - J[3, j] * z)
+            result[k, 2, j] = on * (J[2, j] + J[3, j] * y - J[4, j] * x)
+
+
+@entry(types.void(readable(2), readable(3), readable(1), _places, _places, types.float64[:, :, ::1]))
+def _segments(ends, jacobians, qd, starts, stops, parts):  # type: ignore[no-untyped-def]
+    """Fill parts (4, links, 3): starts, ends, start velocities, end velocities; v = J q̇."""
+    for side in range(2):
+        places = starts if side == 0 else stops
+        for i in range(len(places)):
+            for c in range(3):
+                velocity = 0.0
+                for j in range(len(qd)):
+                    velocity += jacobians[places[i], c, j] * qd[j]
+                parts[side, i, c] = ends[places[i], c]
+                parts[2 + side, i, c] = velocity
