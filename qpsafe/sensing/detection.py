@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -45,14 +46,19 @@ PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
 
 def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q (n,) [rad], finite and not absurd, as an array of its own; or BadInput."""
-    lowest, highest = robot.lower - PLAUSIBLE_EXCESS, robot.upper + PLAUSIBLE_EXCESS
-    return _as_joint_vector("q", value, lowest, highest, robot.joint_names)
+    return _as_joint_vector("q", value, *_plausible(robot)[:2], robot.joint_names)
 
 
 def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q̇ (n,) [rad/s], finite and not absurd, as an array of its own; or BadInput."""
-    highest = PLAUSIBLE_SPEED * robot.max_velocity
-    return _as_joint_vector("qd", value, -highest, highest, robot.joint_names)
+    return _as_joint_vector("qd", value, *_plausible(robot)[2:], robot.joint_names)
+
+
+@functools.lru_cache(maxsize=16)
+def _plausible(robot: Robot) -> tuple[NDArray[np.float64], ...]:
+    """Lowest and highest position, lowest and highest velocity that can be a measurement, (n,) each."""
+    speed = PLAUSIBLE_SPEED * robot.max_velocity
+    return robot.lower - PLAUSIBLE_EXCESS, robot.upper + PLAUSIBLE_EXCESS, -speed, speed
 
 
 def _as_joint_vector(
@@ -61,10 +67,11 @@ def _as_joint_vector(
     array = _as_floats(name, value)
     if array.shape != lowest.shape:
         raise BadInput(f"{name} has shape {array.shape}, expected {lowest.shape}")
-    if not np.isfinite(array).all():
-        raise BadInput(f"{name} is not finite: {array}")
-    wild = ~((lowest <= array) & (array <= highest))
-    if wild.any():
+    sane = (lowest <= array) & (array <= highest)  # false for NaN
+    if not sane.all():
+        if not np.isfinite(array).all():
+            raise BadInput(f"{name} is not finite: {array}")
+        wild = ~sane
         values = [f"{joints[i]} = {array[i]:g}" for i in np.flatnonzero(wild)]
         raise BadInput(f"{name} is too far outside the limits to be a measurement: " + ", ".join(values))
     return array
