@@ -107,7 +107,7 @@ def _slowed(window: Window) -> Reaction:
     """Capped until the end, and slow from some tick on."""
     if window.ticks[-1].severity != CAPPED:
         return Reaction(None)
-    fast = [k for k, record in enumerate(window.ticks) if record.speed > window.rules.speed_cap + 1e-6]
+    fast = [k for k, record in enumerate(window.ticks) if record.speed > 1.001 * window.rules.speed_cap]
     last = max(fast, default=-1) + 2
     return Reaction(last if last <= len(window.ticks) else None)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
+from qpsafe.sensing.hulls import HullSet
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -18,6 +19,7 @@ BodyHull = tuple[int, str, NDArray[np.float64]]
 
 _ROUND = 24  # corners of the polygons that stand for circles
 _loaded: WeakKeyDictionary[Robot, tuple[BodyHull, ...]] = WeakKeyDictionary()
+_sets: WeakKeyDictionary[Robot, HullSet] = WeakKeyDictionary()
 
 
 def body_hulls(robot: Robot) -> tuple[BodyHull, ...]:
@@ -29,6 +31,13 @@ def body_hulls(robot: Robot) -> tuple[BodyHull, ...]:
     if robot not in _loaded:
         _loaded[robot] = _load(robot)
     return _loaded[robot]
+
+
+def body_hull_set(robot: Robot) -> HullSet:
+    """The same hulls, ready to be searched; computed once a robot."""
+    if robot not in _sets:
+        _sets[robot] = HullSet(body_hulls(robot))
+    return _sets[robot]
 
 
 def _load(robot: Robot) -> tuple[BodyHull, ...]:

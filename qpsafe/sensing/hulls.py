@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
@@ -89,21 +90,32 @@ def half_spaces(name: str, vertices: ArrayLike) -> Array:
     Raises:
         ConfigurationError: See `Obstacle`.
     """
-    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial import QhullError
 
     expected = "finite vertices (v, 3) that span a volume [m]"
     points = np.asarray(vertices, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
         raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
     try:
-        faces = ConvexHull(points).equations  # outward unit normals, offsets
+        return _planes(points.tobytes())
     except QhullError:
         raise ConfigurationError(f"obstacle {name}", "vertices", f"{len(points)} flat vertices", expected) from None
+
+
+@lru_cache(maxsize=1024)
+def _planes(vertices: bytes) -> Array:
+    """`half_spaces` of vertices (v, 3) as bytes, read-only. Kept: every controller of a robot asks for the same ones."""
+    from scipy.spatial import ConvexHull
+
+    points = np.frombuffer(vertices).reshape(-1, 3)
+    faces = ConvexHull(points).equations  # outward unit normals, offsets
     axes = np.vstack((np.eye(3), -np.eye(3)))
     sides = np.column_stack((axes, -np.concatenate((points.max(axis=0), -points.min(axis=0)))))
     planes = np.vstack((sides, faces))
     _, first = np.unique(planes.round(9), axis=0, return_index=True)  # triangles of one face have one plane
-    return planes[np.sort(first)]
+    planes = planes[np.sort(first)]
+    planes.flags.writeable = False
+    return planes
 
 
 class HullSet:
@@ -114,15 +126,46 @@ class HullSet:
     """
 
     def __init__(self, hulls: Sequence[tuple[int, str, ArrayLike]]) -> None:
-        planes = [half_spaces(name, vertices) for _, name, vertices in hulls]
         points = [np.asarray(vertices, dtype=float) for _, _, vertices in hulls]
         centres = [0.5 * (p.min(axis=0) + p.max(axis=0)) for p in points]
-        self.names = tuple(name for _, name, _ in hulls)
-        self.bodies = np.array([body for body, _, _ in hulls], dtype=np.int64)
+        self._fill(
+            [name for _, name, _ in hulls],
+            [body for body, _, _ in hulls],
+            [half_spaces(name, vertices) for _, name, vertices in hulls],
+            centres,
+            [float(np.linalg.norm(p - c, axis=1).max()) for p, c in zip(points, centres, strict=True)],
+        )
+
+    def _fill(
+        self, names: list[str], bodies: list[int], planes: list[Array], centres: list[Array], radii: list[float]
+    ) -> None:
+        self.names = tuple(names)
+        self.bodies = np.array(bodies, dtype=np.int64)
         self.planes = np.vstack([np.zeros((0, 4)), *planes])
         self.first = np.concatenate(([0], np.cumsum([len(p) for p in planes]))).astype(np.int64)
         self.centres = np.array(centres).reshape(-1, 3)
-        self.radii = np.array([np.linalg.norm(p - c, axis=1).max() for p, c in zip(points, centres, strict=True)])
+        self.radii = np.array(radii, dtype=float)
+
+    def take(self, chosen: Sequence[int]) -> HullSet:
+        """Some of the hulls."""
+        return HullSet.joined([(self, i) for i in chosen])
+
+    def __add__(self, other: HullSet) -> HullSet:
+        """These hulls and the others."""
+        return HullSet.joined([(hulls, i) for hulls in (self, other) for i in range(len(hulls))])
+
+    @classmethod
+    def joined(cls, chosen: Sequence[tuple[HullSet, int]]) -> HullSet:
+        """Hulls of several sets; nothing is computed anew."""
+        result = cls(())
+        result._fill(
+            [s.names[i] for s, i in chosen],
+            [int(s.bodies[i]) for s, i in chosen],
+            [s.planes[s.first[i] : s.first[i + 1]] for s, i in chosen],
+            [s.centres[i] for s, i in chosen],
+            [float(s.radii[i]) for s, i in chosen],
+        )
+        return result
 
     def __len__(self) -> int:
         return len(self.names)

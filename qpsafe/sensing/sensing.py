@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sensing.body import body_hulls
+from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import HullSet, Obstacle
@@ -78,8 +78,9 @@ class DistanceSensing:
         self.spots = spots
         self._bodies, self._rays = spots.mounting(robot)
         # body 0 is the world: known obstacles stand in it
-        hulls = [(0, obstacle.name, obstacle.vertices) for obstacle in known]
-        self._known = HullSet([*hulls, *(body_hulls(robot) if rules.self_detection else ())])
+        self._known = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
+        if rules.self_detection:
+            self._known = self._known + body_hull_set(robot)
         self._cone = np.tan(0.5 * spots.field_of_view)
         self._fresh_age = np.zeros(len(spots))
         self.health = SpotHealth(len(spots), rules, dt)

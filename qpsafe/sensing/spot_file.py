@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from qpsafe.errors import RobotFileError
-from qpsafe.sensing.body import body_hulls
-from qpsafe.sensing.hulls import HullSet
+from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.spots import Spot
 
 if TYPE_CHECKING:
@@ -129,17 +128,20 @@ def _rotation(path: Path, key: str, table: SpotTable) -> NDArray[np.float64]:
     z = np.array(table.direction)
     if not abs(float(np.linalg.norm(z)) - 1.0) <= 1e-6:
         raise RobotFileError(path, f"{key}.direction", table.direction, "a vector of length 1")
+    z /= np.linalg.norm(z)  # a person writes a few digits
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     return np.stack((x, np.cross(z, x), z), axis=1)
 
 
 def _check_outside(path: Path, spots: list[Spot], robot: Robot) -> None:
+    hulls = body_hull_set(robot)
+    still = np.broadcast_to(np.eye(4), (robot.model.njoints, 4, 4))  # every body in its own frame
     for i, spot in enumerate(spots):
         frame = robot.model.frames[robot.frame_id(spot.frame)]
-        own = HullSet([(0, name, corners) for body, name, corners in body_hulls(robot) if body == frame.parentJoint])
+        own = hulls.take(np.flatnonzero(hulls.bodies == frame.parentJoint).tolist())
         here = (frame.placement.homogeneous @ spot.pose)[None, :3, 3]
-        (found,) = own.find(here, np.array([-BURIED]), np.eye(4)[None])
+        (found,) = own.find(here, np.array([-BURIED]), still)
         if found >= 0:
             expected = f"a place on the surface: this one is inside {own.names[found]}"
             raise RobotFileError(path, f"spot[{i}] ({spot.name}).position", spot.pose[:3, 3].tolist(), expected)

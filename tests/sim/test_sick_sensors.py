@@ -1,0 +1,58 @@
+"""Every sick-sensor case in closed loop: a small version here, the whole matrix when there is time."""
+
+import math
+
+import pytest
+
+import qpsafe
+from qpsafe.sim.choreography import Approach, Choreography
+from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.loop import FixedLoop
+from qpsafe.sim.sick import CASES, run_matrix
+
+ROBOT = qpsafe.load_robot("irb140")
+BRIEF = Choreography(
+    approaches=(Approach(math.radians(0.0), 0.0, 1.02, 0.72, medium_pause=0.2, close_pause=0.2),), duration=9.0
+)
+
+
+def test_a_copy_goes_on_as_the_run_does_bit_by_bit():
+    for sensor in ("ideal", "sharp"):
+        loop = FixedLoop(FixedExperiment(ROBOT, sensor=sensor, choreography=BRIEF))
+        for _ in range(200):
+            loop.step()
+            loop.advance()
+        twin = loop.copy()
+        for _ in range(60):
+            one, other = loop.step(), twin.step()
+            assert one.tick.reference.q.tobytes() == other.tick.reference.q.tobytes()
+            assert one.distances.tobytes() == other.distances.tobytes()
+            loop.advance()
+            twin.advance()
+
+
+def test_every_case_reacts_as_promised():
+    results = run_matrix(FixedExperiment(ROBOT, choreography=BRIEF, duration=9.0), count=2, seed=1, jobs=1)
+    assert [result.case for result in results] == [case.name for case in CASES]
+    for result in results:
+        assert result.kept, result
+    assert sum(result.applied for result in results) > len(results)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensor", ["ideal", "sharp"])
+def test_every_case_at_20_moments(sensor):
+    for result in run_matrix(FixedExperiment(ROBOT, sensor=sensor), count=20, jobs=2):
+        assert result.kept, result
+
+
+@pytest.mark.slow
+def test_the_first_experiment_keeps_its_promises_with_sharp_sensors():
+    from qpsafe.sim.report import summarise
+
+    for seed in (0, 3):
+        experiment = FixedExperiment(ROBOT, sensor="sharp", seed=seed)
+        log = experiment.run()
+        report = summarise(log, experiment.board_distance_without_controller(), experiment.windows(), ROBOT)
+        assert report.kept, [check for check in report.checks if not check.kept]
+        assert set(log.status) == {"ok"}
