@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
@@ -90,32 +89,21 @@ def half_spaces(name: str, vertices: ArrayLike) -> Array:
     Raises:
         ConfigurationError: See `Obstacle`.
     """
-    from scipy.spatial import QhullError
+    from scipy.spatial import ConvexHull, QhullError
 
     expected = "finite vertices (v, 3) that span a volume [m]"
     points = np.asarray(vertices, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
         raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
     try:
-        return _planes(points.tobytes())
+        faces = ConvexHull(points).equations  # outward unit normals, offsets
     except QhullError:
         raise ConfigurationError(f"obstacle {name}", "vertices", f"{len(points)} flat vertices", expected) from None
-
-
-@lru_cache(maxsize=1024)
-def _planes(vertices: bytes) -> Array:
-    """`half_spaces` of vertices (v, 3) as bytes, read-only. Kept: every controller of a robot asks for the same ones."""
-    from scipy.spatial import ConvexHull
-
-    points = np.frombuffer(vertices).reshape(-1, 3)
-    faces = ConvexHull(points).equations  # outward unit normals, offsets
     axes = np.vstack((np.eye(3), -np.eye(3)))
     sides = np.column_stack((axes, -np.concatenate((points.max(axis=0), -points.min(axis=0)))))
     planes = np.vstack((sides, faces))
     _, first = np.unique(planes.round(9), axis=0, return_index=True)  # triangles of one face have one plane
-    planes = planes[np.sort(first)]
-    planes.flags.writeable = False
-    return planes
+    return planes[np.sort(first)]
 
 
 class HullSet:
