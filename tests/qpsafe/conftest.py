@@ -104,7 +104,9 @@ def irb140() -> Any:
 def run(irb140: Any) -> Callable[..., Run]:
     """Makes a closed loop: `run(law=None, q=None, **options of SafetyController)`."""
 
+    spots = qpsafe.load_spots(irb140)  # once, it takes longer than all the rest
+
     def make(law: Any = None, **options: Any) -> Run:
-        return Run(irb140, law, **options)
+        return Run(irb140, law, **({"spots": spots} | options))
 
     return make
