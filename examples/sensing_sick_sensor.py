@@ -1,0 +1,31 @@
+"""A sensor dies while somebody stands before it: what was seen is held and comes nearer, then the robot goes slowly."""
+
+import numpy as np
+
+import qpsafe
+
+
+def main() -> None:
+    robot = qpsafe.load_robot("irb140")
+    here = qpsafe.FixedPose(robot.pose("tcp", robot.home))
+    tasks = [qpsafe.PositionTask("tcp", here), qpsafe.OrientationTask("tcp", here)]
+    controller = qpsafe.SafetyController(robot, tasks)
+
+    q, qd = robot.home, np.zeros(6)
+    print(" time   reads  points  CDF_n   status    severity")
+    for k in range(120):
+        distances = np.full(20, np.inf)
+        distances[19] = 0.45 if k < 30 else np.nan  # the flange's spot: its cable breaks at 0.12 s
+        tick = controller.step(q, qd, distances)
+        q, qd = tick.reference.q, tick.reference.qd  # a robot that follows perfectly
+        if k % 10 == 0 or k in (30, 34):
+            row = f"{tick.reference.time:5.2f}  {distances[19]:6.2f}  {len(tick.points):6d}  {tick.cdf_n:5.2f}"
+            print(f"{row}   {tick.status:8s}  {tick.severity}")
+    print(tick.messages[0])
+
+    controller.acknowledge()  # the cable is mended
+    print("acknowledged:", controller.step(q, qd, np.full(20, np.inf)).severity)
+
+
+if __name__ == "__main__":
+    main()
