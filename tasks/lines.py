@@ -1,0 +1,39 @@
+"""Where in a TOML text a key stands, so that a mistake can be named with its line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+Key = tuple[str | int, ...]
+_HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]")
+_KEY = re.compile(r"\s*([\w.\"'-]+)\s*=")
+
+
+def line_of(text: str, keys: Sequence[str | int]) -> int:
+    """Line, from 1, of a key such as ``("segment", 2, "to")``, or of the innermost table around it that has a line."""
+    lines = key_lines(text)
+    for length in range(len(keys), 0, -1):
+        if tuple(keys[:length]) in lines:
+            return lines[tuple(keys[:length])]
+    return 1
+
+
+def key_lines(text: str) -> dict[Key, int]:
+    """Line, from 1, of every table and every key at the beginning of a line; keys of inline tables have none."""
+    found: dict[Key, int] = {}
+    table: Key = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if head := _HEAD.match(line):
+            table = _split(head.group(2))
+            if head.group(1) == "[[":
+                count = sum(1 for key in found if key[:-1] == table and isinstance(key[-1], int))
+                table = (*table, count)
+            found.setdefault(table, number)
+        elif key := _KEY.match(line):
+            found.setdefault((*table, *_split(key.group(1))), number)
+    return found
+
+
+def _split(dotted: str) -> Key:
+    return tuple(part.strip(" \"'") for part in dotted.split("."))

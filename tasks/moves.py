@@ -1,0 +1,193 @@
+"""Moves of a frame from one pose to another, at rest at both ends: lines, arcs, dwells, joint moves."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.tasks.rotation import exp3, log3
+from qpsafe.tasks.timing import Rates, TimeLaw
+from qpsafe.tasks.trajectory import JointSample, Sample, checked_pose, checked_vector
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+LINEAR = Rates(0.25, 1.0, 10.0)
+ANGULAR = Rates(0.8, 3.0, 30.0)
+SMALL = 1e-9  # m or rad: not a move
+
+
+class Move(Protocol):
+    """A reference pose from time 0 to `duration`, at rest at both ends."""
+
+    duration: float
+
+    def sample(self, t: float) -> Sample:
+        """Reference at time t [s], at rest at the goal from `duration` on."""
+        ...
+
+
+class Line:
+    """Straight line, the orientation turning by the shortest way; one jerk-limited time law for both.
+
+    Args:
+        start, goal: Poses (4, 4).
+        linear: Rates of the origin [m].
+        angular: Rates of the orientation [rad].
+
+    Raises:
+        ConfigurationError: A pose is none, or start and goal are the same.
+    """
+
+    def __init__(self, start: ArrayLike, goal: ArrayLike, linear: Rates = LINEAR, angular: Rates = ANGULAR) -> None:
+        name = type(self).__name__
+        self.start, self.goal = checked_pose(name, "start", start), checked_pose(name, "goal", goal)
+        self._turn = log3(self.goal[:3, :3] @ self.start[:3, :3].T)
+        self._shift = self.goal[:3, 3] - self.start[:3, 3]
+        length, angle = self._length(), float(np.linalg.norm(self._turn))
+        if not max(length, angle) > SMALL:
+            raise ConfigurationError(name, "goal", "the start itself", "a pose to move to")
+        rates = [r.over(size) for r, size in ((self._admissible(linear), length), (angular, angle)) if size > SMALL]
+        tightest = rates[0] if len(rates) == 1 else rates[0].both(rates[1])
+        #: Time law of the share u of the way, from 0 to 1.
+        self.law = TimeLaw([0.0], [1.0], [tightest.speed], [tightest.acceleration], [tightest.jerk])
+        self.duration = self.law.duration
+
+    def sample(self, t: float) -> Sample:
+        """Reference at time t [s]."""
+        u, du, _ = (float(value[0]) for value in self.law.at(t))
+        pose = np.eye(4)
+        pose[:3, :3] = exp3(u * self._turn) @ self.start[:3, :3]
+        pose[:3, 3], tangent = self._place(u)
+        return Sample(pose, du * np.concatenate((tangent, self._turn)))
+
+    def _length(self) -> float:
+        return float(np.linalg.norm(self._shift))
+
+    def _admissible(self, linear: Rates) -> Rates:
+        return linear
+
+    def _place(self, u: float) -> tuple[Array, Array]:
+        """Origin at the share u of the way, and its derivative with respect to u, (3,) each."""
+        return self.start[:3, 3] + u * self._shift, self._shift
+
+
+class Arc(Line):
+    """Arc of a circle through a third point, the orientation turning by the shortest way.
+
+    Args:
+        start, goal: Poses (4, 4).
+        via: Point on the way (3,) [m].
+        linear: Rates along the arc [m]; the speed also keeps v²/r below the acceleration.
+        angular: Rates of the orientation [rad].
+
+    Raises:
+        ConfigurationError: The three points lie on a line, or as for `Line`.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        via: ArrayLike,
+        goal: ArrayLike,
+        linear: Rates = LINEAR,
+        angular: Rates = ANGULAR,
+    ) -> None:
+        a, c = checked_pose("Arc", "start", start)[:3, 3], checked_pose("Arc", "goal", goal)[:3, 3]
+        b = checked_vector("Arc", "via", via, 3)
+        # circumcentre of a, b, c
+        u, v = b - a, c - a
+        normal = np.cross(u, v)
+        area = float(normal @ normal)
+        if not area > 1e-6 * float(u @ u) * float(v @ v) or not area > 1e-18:
+            raise ConfigurationError("Arc", "via", b.tolist(), "a point off the line from start to goal")
+        self.centre = a + np.cross(float(u @ u) * v - float(v @ v) * u, normal) / (2.0 * area)
+        self._arm = a - self.centre
+        self.radius = float(np.linalg.norm(self._arm))
+        self._axis = normal / math.sqrt(area)
+        side = np.cross(self._axis, self._arm)
+        self._angle = math.atan2(float((c - self.centre) @ side), float((c - self.centre) @ self._arm)) % (2 * math.pi)
+        super().__init__(start, goal, linear, angular)
+
+    def _length(self) -> float:
+        return self.radius * self._angle
+
+    def _admissible(self, linear: Rates) -> Rates:
+        speed = min(linear.speed, math.sqrt(linear.acceleration * self.radius))
+        return Rates(speed, linear.acceleration, linear.jerk)
+
+    def _place(self, u: float) -> tuple[Array, Array]:
+        arm = exp3(u * self._angle * self._axis) @ self._arm
+        return self.centre + arm, self._angle * np.cross(self._axis, arm)
+
+
+class Dwell:
+    """Stay.
+
+    Args:
+        pose: (4, 4).
+        duration: [s].
+    """
+
+    def __init__(self, pose: ArrayLike, duration: float) -> None:
+        if not (isinstance(duration, int | float) and 0.0 <= duration < math.inf):
+            raise ConfigurationError("Dwell", "duration", duration, "a finite time >= 0 [s]")
+        self.pose, self.duration = checked_pose("Dwell", "pose", pose), float(duration)
+
+    def sample(self, t: float) -> Sample:
+        """The pose, at rest."""
+        return Sample(self.pose, np.zeros(6))
+
+
+class JointMove:
+    """Joints from any state to rest at a goal, all arriving together: a trajectory for a `JointTask`.
+
+    Args:
+        start, goal: (n,) [rad].
+        speed, acceleration, jerk: Largest ones (n,) [rad/s ...].
+        velocity, start_acceleration: At the start (n,); zero by default.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        speed: ArrayLike,
+        acceleration: ArrayLike,
+        jerk: ArrayLike,
+        velocity: ArrayLike | None = None,
+        start_acceleration: ArrayLike | None = None,
+    ) -> None:
+        self.law = TimeLaw(start, goal, speed, acceleration, jerk, velocity, start_acceleration)
+        self.duration = self.law.duration
+
+    def sample(self, t: float) -> JointSample:
+        """Joint positions and velocities at time t [s]."""
+        motion = self.law.at(t)
+        return JointSample(motion.position, motion.velocity)
+
+
+class JointMoveOfFrame:
+    """A joint move as the pose of a frame, so that position and orientation tasks can follow it.
+
+    Args:
+        robot: The robot.
+        frame: Frame whose pose is given.
+        move: Of the robot's joints.
+    """
+
+    def __init__(self, robot: Robot, frame: str, move: JointMove) -> None:
+        self.robot, self.frame, self.move = robot, frame, move
+        self.duration = move.duration
+
+    def sample(self, t: float) -> Sample:
+        """Pose and twist J q̇ of the frame at time t [s]."""
+        position, velocity = self.move.sample(t)
+        state = self.robot.at(position)
+        return Sample(state.pose(self.frame), state.jacobian(self.frame) @ velocity)

@@ -1,0 +1,77 @@
+"""A program: moves one after the other, with events in between, as one trajectory."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.tasks.moves import Move
+from qpsafe.tasks.trajectory import Sample
+
+
+class Event(NamedTuple):
+    """Something to do at a point of a path, such as to grip: when the path's clock passes it, once."""
+
+    time: float
+    name: str
+
+
+class Program:
+    """Moves in a row. It keeps no clock: the same time gives the same reference, so it can be paused anywhere.
+
+    Args:
+        moves: At least one; each begins where the one before it ends.
+        events: Pairs of the number of the move before which it happens, and its name.
+        cycle: Whether to begin again at the end, for ever.
+
+    Raises:
+        ConfigurationError: No moves, a gap between two of them, an event that belongs nowhere, a cycle not closed.
+    """
+
+    def __init__(self, moves: Sequence[Move], events: Sequence[tuple[int, str]] = (), cycle: bool = False) -> None:
+        if not moves:
+            raise ConfigurationError("Program", "moves", moves, "at least one move")
+        self.moves, self.cycle = tuple(moves), cycle
+        followers = [*self.moves[1:], *self.moves[:1]] if cycle else self.moves[1:]
+        for k, (move, after) in enumerate(zip(self.moves, followers, strict=False)):
+            gap = np.abs(after.sample(0.0).pose - move.sample(move.duration).pose).max()
+            if not gap <= 1e-6:
+                follower = (k + 1) % len(self.moves)
+                expected = f"to begin where moves[{k}] ends (found a gap of {gap:.3g})"
+                raise ConfigurationError("Program", f"moves[{follower}]", after, expected)
+        self._ends = list(accumulate(move.duration for move in self.moves))
+        self.duration = self._ends[-1]
+        if cycle and not self.duration > 0.0:
+            raise ConfigurationError("Program", "cycle", cycle, "moves that take some time")
+        starts = [0.0, *self._ends]
+        for k, (place, name) in enumerate(events):
+            if not 0 <= place <= len(self.moves):
+                raise ConfigurationError("Program", f"events[{k}]", place, f"0 to {len(self.moves)}")
+            if not name:
+                raise ConfigurationError("Program", f"events[{k}]", name, "a name")
+        #: Events of one cycle, in their order.
+        self.events = tuple(sorted((Event(starts[place], name) for place, name in events), key=lambda e: e.time))
+
+    def sample(self, t: float) -> Sample:
+        """Reference at time t [s]; at rest at the last goal after the end, unless it is a cycle."""
+        if self.cycle:
+            t %= self.duration
+        k = min(bisect_right(self._ends, t), len(self.moves) - 1)
+        return self.moves[k].sample(t - (self._ends[k - 1] if k else 0.0))
+
+    def move_at(self, t: float) -> int:
+        """Number of the move at time t [s]."""
+        return min(bisect_right(self._ends, t % self.duration if self.cycle else t), len(self.moves) - 1)
+
+    def event(self, k: int) -> Event | None:
+        """The k-th event from 0 on, cycles counted through; None if there is none."""
+        if not self.events or (k >= len(self.events) and not self.cycle):
+            return None
+        round_, place = divmod(k, len(self.events))
+        event = self.events[place]
+        return Event(event.time + round_ * self.duration, event.name)

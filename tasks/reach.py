@@ -1,0 +1,71 @@
+"""Can the robot follow a path? Joint positions along it, found step by step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import QpsafeError
+from qpsafe.tasks.moves import Move
+from qpsafe.tasks.rotation import log3
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class UnreachableError(QpsafeError, ValueError):
+    """The robot cannot take a pose, or cannot take it at this speed; the message says why."""
+
+
+def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int = 200) -> Array:
+    """Joint positions (n,) at which `frame` has `pose` (4, 4), by damped Gauss-Newton from a guess, inside the limits.
+
+    Raises:
+        UnreachableError: None was found from this guess.
+    """
+    q = np.array(guess, dtype=float)
+    error = np.full(6, np.inf)
+    for _ in range(steps):
+        state = robot.at(q)
+        here = state.pose(frame)
+        error = np.concatenate((pose[:3, 3] - here[:3, 3], log3(pose[:3, :3] @ here[:3, :3].T)))
+        if np.abs(error).max() <= 1e-9:
+            return q
+        J = state.jacobian(frame)
+        damping = 1e-9 + 1e-2 * float(error @ error)  # small near the goal: there it converges quadratically
+        dq = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+        q = np.clip(q + dq / max(1.0, float(np.abs(dq).max()) / 0.3), robot.lower, robot.upper)
+    if np.abs(error).max() <= 1e-6:
+        return q
+    at_limit = [
+        name for name, a, b, c in zip(robot.joint_names, q, robot.lower, robot.upper, strict=True) if a in (b, c)
+    ]
+    reason = f"{', '.join(at_limit)} at a limit" if at_limit else "out of reach"
+    shift, turn = 1e3 * np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+    raise UnreachableError(f"{reason}: nearest found is {shift:.1f} mm and {turn:.3f} rad away")
+
+
+def follow(robot: Robot, frame: str, move: Move, q: Array, period: float = 0.02) -> Array:
+    """Joint positions (n,) at the end of a move that starts at q.
+
+    Raises:
+        UnreachableError: A pose on the way cannot be taken, or some joint would be too fast.
+    """
+    count = max(int(np.ceil(move.duration / period)), 1)
+    for k in range(1, count + 1):
+        t = move.duration * k / count
+        try:
+            after = joints_for(robot, frame, move.sample(t).pose, q, steps=30)
+        except UnreachableError as problem:
+            raise UnreachableError(f"{t:.2f} s on the way, {problem}") from None
+        speed = np.abs(after - q) * count / move.duration if move.duration > 0.0 else np.zeros(len(q))
+        fastest = int((speed / robot.max_velocity).argmax())
+        if not speed[fastest] <= robot.max_velocity[fastest]:
+            name, limit = robot.joint_names[fastest], robot.max_velocity[fastest]
+            raise UnreachableError(f"{t:.2f} s on the way, {name} needs {speed[fastest]:.2f} of {limit:.2f} rad/s")
+        q = after
+    return q

@@ -1,0 +1,183 @@
+"""Programs in TOML: read, followed by the robot, and refused with file, line and key."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import qpsafe
+from qpsafe.tasks.lines import line_of
+from qpsafe.tasks.program_file import ProgramError, load_program
+
+robot = qpsafe.load_robot("irb140")
+GOOD = """# pick, lift, carry, drop
+cycle = true
+start = "rest"
+
+[rates]
+speed = 0.2
+
+[points]
+rest = { joints = [0.0, -5.0, 0.0, 0.0, 85.0, 0.0] }
+pick = { position = [0.45, 0.2, 0.4] }
+above = { position = [0.45, 0.2, 0.5] }
+over = { position = [0.5, 0.0, 0.55] }
+
+[points.drop]
+position = [0.45, -0.2, 0.5]
+euler = [180.0, 80.0, 180.0]
+
+[[segment]]
+do = "joint"
+to = "above"
+
+[[segment]]
+do = "line"
+to = "pick"
+speed = 0.05
+
+[[segment]]
+do = "event"
+name = "grip"
+dwell = 0.3
+
+[[segment]]
+do = "line"
+to = "above"
+
+[[segment]]
+do = "arc"
+via = "over"
+to = "drop"
+
+[[segment]]
+do = "event"
+name = "release"
+
+[[segment]]
+do = "dwell"
+time = 0.2
+
+[[segment]]
+do = "joint"
+to = "rest"
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "program.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_program_does_what_its_file_says(tmp_path: Path) -> None:
+    program = load_program(write(tmp_path, GOOD), robot)
+    assert [event.name for event in program.events] == ["grip", "release"]
+    home = robot.pose("tcp", robot.home)
+    assert program.sample(0.0).pose == pytest.approx(home, abs=1e-9)
+    grip, release = (program.sample(event.time) for event in program.events)
+    assert grip.pose[:3, 3] == pytest.approx([0.45, 0.2, 0.4], abs=1e-7)
+    assert grip.pose[:3, :3] == pytest.approx(home[:3, :3], abs=1e-7)  # oriented as at the start
+    assert release.pose[:3, 3] == pytest.approx([0.45, -0.2, 0.5], abs=1e-7)
+    for sample in (grip, release):
+        assert np.abs(sample.twist).max() < 1e-6
+    times = np.linspace(0.0, program.duration, 500)
+    assert max(np.linalg.norm(program.sample(t).twist[:3]) for t in times if program.move_at(t) == 1) <= 0.05 + 1e-9
+    z = [program.sample(t).pose[2, 3] for t in times]
+    assert max(z) == pytest.approx(0.55, abs=5e-3)  # by way of `over`
+
+
+def test_the_controller_follows_a_program_and_reports_its_events(tmp_path: Path) -> None:
+    program = load_program(write(tmp_path, GOOD), robot)
+    tasks = [qpsafe.PositionTask("tcp", program), qpsafe.OrientationTask("tcp", program)]
+    controller = qpsafe.SafetyController(robot, tasks)
+    q, qd, events = robot.home, np.zeros(6), []
+    for _ in range(round(1.9 * program.duration / 0.004)):
+        tick = controller.step(q, qd, points=[])
+        assert tick.status == "ok"
+        assert np.linalg.norm(tick.errors[0]) < 1e-3
+        assert np.linalg.norm(tick.errors[1]) < 3e-3
+        q, qd = tick.reference.q, tick.reference.qd
+        if tick.events:
+            place = robot.pose("tcp", q)[:3, 3]
+            events.append((*tick.events, tuple(np.round(place, 3))))
+    grip, release = ("grip", (0.45, 0.2, 0.4)), ("release", (0.45, -0.2, 0.5))
+    assert events in ([grip, release, grip], [grip, release, grip, release])
+
+
+LINE = GOOD.splitlines().index('do = "line"') + 1  # of the second segment
+MISTAKES = {
+    "unknown key": ("cycle = true", "cycles = true", 2, "cycles"),
+    "not a boolean": ("cycle = true", 'cycle = "yes"', 2, "cycle"),
+    "unknown start": ('start = "rest"', 'start = "bed"', 3, "start"),
+    "no speed": ("speed = 0.2", "speed = 0.0", 6, "rates.speed"),
+    "infinite speed": ("speed = 0.05", "speed = inf", LINE + 2, "segment[1].speed"),
+    "unknown kind": ('do = "line"', 'do = "fly"', LINE - 1, "segment[1]"),
+    "unknown point": ('to = "pick"', 'to = "peck"', LINE + 1, "segment[1].to"),
+    "unknown frame": ("cycle = true", 'frame = "tip"', 2, "frame"),
+    "too few joints": ("0.0, 85.0, 0.0]", "85.0]", 9, "points.rest.joints"),
+    "joint past its limit": ("85.0, 0.0]", "130.0, 0.0]", 9, "points.rest.joints"),
+    "position of two numbers": ("[0.45, 0.2, 0.4]", "[0.45, 0.2]", 10, "points.pick.position[2]"),
+    "position and joints": ("euler = [180.0, 80.0, 180.0]", "joints = [0.0]", 14, "points.drop"),
+    "out of reach": ("[0.45, 0.2, 0.4]", "[1.45, 0.2, 0.4]", LINE + 1, "segment[1].to"),
+    "under the floor": ("[0.45, 0.2, 0.4]", "[0.1, 0.0, -0.4]", LINE + 1, "segment[1].to"),
+    "arc along a line": (
+        "[0.5, 0.0, 0.55]",
+        "[0.45, 0.0, 0.5]",
+        GOOD.splitlines().index('via = "over"') + 1,
+        "segment[4].via",
+    ),
+    "nowhere to go": ('to = "pick"', 'to = "above"', LINE + 1, "segment[1].to"),
+    "cycle that does not close": ('to = "rest"', 'to = "above"', 2, "cycle"),
+    "event without a name": ('name = "grip"', "dwell = 0.1 #", LINE + 4, "segment[2].name"),
+    "NaN": ("time = 0.2", "time = nan", GOOD.splitlines().index("time = 0.2") + 1, "segment[6].time"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_refused_with_file_line_and_key(tmp_path: Path, name: str) -> None:
+    old, new, line, key = MISTAKES[name]
+    if name == "event without a name":
+        old, new = 'name = "grip"\ndwell = 0.3', "dwell = 0.3"
+    path = write(tmp_path, GOOD.replace(old, new, 1))
+    with pytest.raises(ProgramError) as caught:
+        load_program(path, robot)
+    error = caught.value
+    assert (error.where, error.key) == (f"{path}:{line}", key), str(error)
+    assert error.expected
+
+
+def test_malformed_files_are_refused_with_the_line(tmp_path: Path) -> None:
+    with pytest.raises(ProgramError, match=r"program\.toml:3"):
+        load_program(write(tmp_path, 'cycle = true\n\nstart = "rest\n'), robot)
+    with pytest.raises(ProgramError, match="file"):
+        load_program(tmp_path / "none.toml", robot)
+    with pytest.raises(ProgramError, match="segment"):
+        load_program(write(tmp_path, ""), robot)
+    with pytest.raises(ProgramError, match="segment"):
+        load_program(write(tmp_path, '[[segment]]\ndo = "event"\nname = "grip"\n'), robot)
+
+
+def test_too_fast_for_a_joint_is_refused_by_its_name(tmp_path: Path) -> None:
+    text = GOOD.replace("speed = 0.05", "speed = 40.0").replace(
+        "speed = 0.2", "speed = 40.0\nacceleration = 1e4\njerk = 1e7"
+    )
+    with pytest.raises(ProgramError, match=r"segment\[1\].to.*joint_\d needs"):
+        load_program(write(tmp_path, text), robot)
+
+
+def test_lines_of_keys() -> None:
+    text = 'a = 1\n[b.c]\nd = 2\n"e f" = 3\n[[g]]\nh = 4\n[[g]]\nh = 5\n  [i]\n'
+    expected = {
+        ("a",): 1,
+        ("b", "c"): 2,
+        ("b", "c", "d"): 3,
+        ("g", 0, "h"): 6,
+        ("g", 1): 7,
+        ("g", 1, "h"): 8,
+        ("i",): 9,
+    }
+    for keys, line in expected.items():
+        assert line_of(text, keys) == line
+    assert line_of(text, ("g", 1, "x")) == 7
+    assert line_of(text, ("x",)) == 1
