@@ -23,8 +23,10 @@ def main() -> None:
             print(f"{row}   {tick.status:8s}  {tick.severity}")
     print(tick.messages[0])
 
-    controller.acknowledge()  # the cable is mended
-    print("acknowledged:", controller.step(q, qd, np.full(20, np.inf)).severity)
+    mended = np.full(20, np.inf)
+    print("mended:", controller.step(q, qd, mended).severity)  # severity only rises ...
+    controller.acknowledge()  # ... until a person has looked
+    print("acknowledged:", controller.step(q, qd, mended).severity)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ within the ticks that it states.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -261,11 +262,13 @@ def run_matrix(
     done: list[list[tuple[Reaction, bool, float, float, float]]] = []
     if jobs > 1 and "fork" in multiprocessing.get_all_start_methods():
         _WORK[:] = work
-        with multiprocessing.get_context("fork").Pool(jobs) as pool:
+        with multiprocessing.get_context("fork").Pool(jobs, initializer=_plain_signals) as pool:
             for item in pool.imap(_inherited, range(count)):
                 done.append(item)
                 if progress is not None:
                     progress(total - (count - len(done)) * (len(cases) + 1) * WINDOW, total)
+            pool.close()
+            pool.join()
         _WORK.clear()
     else:
         for item in work:
@@ -276,6 +279,12 @@ def run_matrix(
 
 
 _WORK: list[tuple[FixedLoop, Array, Sequence[Case], int]] = []  # inherited by forked processes, never pickled
+
+
+def _plain_signals() -> None:
+    """Let the parent alone answer Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _inherited(n: int) -> list[tuple[Reaction, bool, float, float, float]]:

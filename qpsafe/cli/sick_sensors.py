@@ -52,31 +52,32 @@ def sick_sensors(
 
 def show(results: list[Result], screen: Console) -> None:
     """Print the matrix."""
+    from rich import box
     from rich.table import Table
 
-    table = Table(title="Sick sensors in the first experiment, each case at every moment")
-    for heading in ("", "case", "promised reaction"):
-        table.add_column(heading)
-    for heading in ("moments", "ticks", "at most", "missing", "contacts", "limits", "nearest", "healthy"):
+    title = "Sick sensors in the first experiment, each case at every moment"
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in ("", "case"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("reaction", overflow="fold")
+    for heading in ("moments", "ticks", "contacts", "limits", "nearest, m"):
         table.add_column(heading, justify="right")
     for r in results:
+        late = f" ({r.missing} missing)" if r.missing else ""
         table.add_row(
-            "[green]kept[/]" if r.kept else "[red]NOT kept[/]",
+            "[green]kept[/]" if r.kept else "[red]NOT[/]",
             r.case,
             r.promise,
-            f"{r.applied} of {r.moments}",
-            str(r.slowest),
-            str(r.within),
-            str(r.missing),
+            f"{r.applied}/{r.moments}",
+            f"{r.slowest}/{r.within}{late}",
             str(r.contacts),
-            "none" if r.passed <= 1e-9 else f"{r.passed:.1e}",
-            f"{r.nearest:.3f}",
-            f"{r.nearest_healthy:.3f}",
+            "kept" if r.passed <= 1e-9 else f"{r.passed:.1e}",
+            f"{r.nearest:.3f} {r.nearest_healthy:.3f}",
         )
     screen.print(table)
     screen.print(
-        "moments: those where the case can show; ticks: slowest reaction, 4 ms each; limits: passed by how much, "
-        "relative;\nnearest, healthy: smallest distance to board or person [m], with the fault and without",
+        "moments: those where the case can show; ticks of 4 ms: slowest reaction and how many are promised; nearest: "
+        "smallest distance to board or person with the fault, and without",
         style="dim",
         highlight=False,
     )
