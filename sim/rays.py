@@ -58,7 +58,7 @@ def cast(
     many = directions if directions.ndim == 3 else directions[:, None, :]
     k, n = many.shape[:2]
     lengths = np.sqrt((many * many).sum(axis=2))
-    valid = np.isfinite(origins).all(axis=1)[:, None] & np.isfinite(lengths) & (lengths > 0.0)
+    valid = np.asarray(np.isfinite(origins).all(axis=1))[:, None] & np.isfinite(lengths) & (lengths > 0.0)
     safe = np.where(valid[..., None], many, (0.0, 0.0, 1.0)) / np.where(valid, lengths, 1.0)[..., None]
     places = np.where(valid.any(axis=1)[:, None], origins, 0.0)
     seen = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)

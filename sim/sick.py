@@ -271,8 +271,8 @@ def run_matrix(
             pool.join()
         _WORK.clear()
     else:
-        for item in work:
-            done.append(_moment(*item))
+        for task in work:
+            done.append(_moment(*task))
             if progress is not None:
                 progress(total - (count - len(done)) * (len(cases) + 1) * WINDOW, total)
     return [_summary(case, [item[c] for item in done]) for c, case in enumerate(cases)]

@@ -49,9 +49,10 @@ class SpotHealth:
     def reset(self) -> None:
         """Forget everything, what was acknowledged or not."""
         k = self._count
-        self.codes = np.zeros(k, dtype=np.int64)
-        self.dead = np.zeros(k, dtype=np.bool_)
+        self.codes: NDArray[np.int64] = np.zeros(k, dtype=np.int64)
+        self.dead: NDArray[np.bool_] = np.zeros(k, dtype=np.bool_)
         self.stopped = False
+        self._tally = np.zeros(2, dtype=np.int64)  # spots that are dead; that are unusable or dead, in this tick
         self._out = 0  # spots that are unusable or dead in this tick
         self._sick = np.zeros(k, dtype=np.int64)  # ticks without a usable reading, up to now
         self._same = np.zeros(k, dtype=np.int64)  # ticks with the same reading, up to now
@@ -73,7 +74,7 @@ class SpotHealth:
             origins: Of the spots now (k, 3) [m].
             directions: Of the spots now (k, 3).
         """
-        dead, self._out = _classify(
+        _classify(
             distances,
             ages,
             origins,
@@ -88,8 +89,10 @@ class SpotHealth:
             self.codes,
             self._sick,
             self.dead,
+            self._tally,
         )
-        self.stopped |= dead > self.most
+        self._out = int(self._tally[1])
+        self.stopped |= bool(self._tally[0] > self.most)
 
     @property
     def severity(self) -> str:
@@ -111,7 +114,7 @@ _INTS = types.int64[::1]
 
 
 @entry(
-    types.UniTuple(types.int64, 2)(
+    types.void(
         readable(1),
         readable(1),
         readable(2),
@@ -126,6 +129,7 @@ _INTS = types.int64[::1]
         _INTS,
         _INTS,
         types.boolean[::1],
+        _INTS,
     )
 )
 def _classify(
@@ -143,8 +147,9 @@ def _classify(
     codes: Array,
     sick: Array,
     dead: Array,
-) -> tuple[int, int]:
-    """Fill codes, count sick ticks, let the dead die; how many are dead, how many dead or unusable."""
+    tally: Array,
+) -> None:
+    """Fill codes, count sick ticks, let the dead die; tally how many are dead, and how many dead or unusable."""
     count = out = 0
     for i in range(distances.shape[0]):
         d = distances[i]
@@ -175,4 +180,4 @@ def _classify(
             dead[i] = True
         count += dead[i]
         out += dead[i] or sick[i] > 0
-    return count, out
+    tally[0], tally[1] = count, out

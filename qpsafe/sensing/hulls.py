@@ -61,7 +61,7 @@ class Obstacle:
             pose: Of the mesh in the world, (4, 4); the identity by default.
             scale: Metres in one unit of the file.
         """
-        import coal
+        import coal  # type: ignore[import-untyped]
 
         if not Path(path).is_file():
             raise ConfigurationError(f"obstacle {name}", "path", str(path), "a mesh file")

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import qpsafe
+from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.known import known_obstacles
 from qpsafe.sim.log import RunLog, intervals
 from qpsafe.sim.report import summarise
 
@@ -101,6 +103,23 @@ def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
     assert set(pairwise(phases)) <= allowed | {("recovering", "suspended")}
     assert phases.count("following") == 4  # before, between and after three approaches
     assert phases[0] == phases[-1] == "following"
+
+
+def test_the_robot_sees_itself_and_it_does_not_count(log: RunLog, experiment: FixedExperiment) -> None:
+    """Bent back before the board, the upper arm's rear spot sees the robot's own body, nearer than any person is."""
+    spots = qpsafe.load_spots(ROBOT)
+    sensing = DistanceSensing(ROBOT, spots, log.dt, known=known_obstacles(experiment.scene))
+    own: dict[str, int] = {}
+    for q, distances in zip(log.q, log.distances, strict=True):
+        hit = np.flatnonzero(distances <= spots.range_max)
+        if len(hit):
+            state = ROBOT.at(q)
+            sensing.reset()
+            seen = sensing.update(state, state.wire(np.zeros(6)), distances)
+            for k in hit[~np.isfinite(sensing.counted[hit])]:
+                own[spots.names[k]] = own.get(spots.names[k], 0) + 1
+            assert len(seen.points) == np.isfinite(sensing.counted).sum()
+    assert own.get("upper arm rear", 0) > 50, own
 
 
 def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperiment) -> None:
