@@ -57,22 +57,20 @@ def show(results: list[Result], screen: Console) -> None:
 
     title = "Sick sensors in the first experiment, each case at every moment"
     table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in ("", "case"):
+    for heading in ("", "case and promised reaction"):
         table.add_column(heading, no_wrap=True)
-    table.add_column("reaction", overflow="fold")
     for heading in ("moments", "ticks", "contacts", "limits", "nearest, m"):
         table.add_column(heading, justify="right")
     for r in results:
         late = f" ({r.missing} missing)" if r.missing else ""
         table.add_row(
             "[green]kept[/]" if r.kept else "[red]NOT[/]",
-            r.case,
-            r.promise,
+            f"{r.case}\n  [dim]{r.promise}[/]",
             f"{r.applied}/{r.moments}",
             f"{r.slowest}/{r.within}{late}",
             str(r.contacts),
             "kept" if r.passed <= 1e-9 else f"{r.passed:.1e}",
-            f"{r.nearest:.3f} {r.nearest_healthy:.3f}",
+            f"{r.nearest:.3f}\n[dim]{r.nearest_healthy:.3f}[/]",
         )
     screen.print(table)
     screen.print(
