@@ -28,7 +28,8 @@ class RecoveryRules:
     """How the robot returns to its path, and when it counts as returned.
 
     Attributes:
-        speed, angular_speed, joint_speed: Peak speed of a return [m/s], [rad/s], [rad/s].
+        speed, angular_speed, joint_speed: Peak speed of a return from rest [m/s], [rad/s], [rad/s]; what is left of the
+            evasive motion, at most as fast, runs out on top of it.
         shortest: Least duration of a return [s], so that small ones stay gentle.
         tolerance: Largest error norm at which a task counts as met [m or rad].
         ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
@@ -61,25 +62,37 @@ class RecoveryRules:
             mean = max(shift / self.speed, turn / self.angular_speed)
         return max(15.0 / 8.0 * mean, self.shortest)
 
+    def slowed(self, rate: NDArray[np.float64], joints: bool) -> NDArray[np.float64]:
+        """The rate of an offset (6,) or (n,), no faster than a return."""
+        if joints:
+            return rate * min(1.0, self.joint_speed / max(float(np.abs(rate).max()), 1e-12))
+        linear, angular = max(float(np.linalg.norm(rate[:3])), 1e-12), max(float(np.linalg.norm(rate[3:])), 1e-12)
+        scale = min(1.0, self.speed / linear), min(1.0, self.angular_speed / angular)
+        return np.concatenate((scale[0] * rate[:3], scale[1] * rate[3:]))
+
 
 @dataclass(frozen=True, eq=False)
 class Return:
-    """The way back of one task: its offset from the reference, which fades by minimum jerk.
+    """The way back of one task: its offset from the reference, which fades by minimum jerk from the task's own speed.
 
     Attributes:
         offset: At the start (6,) or (n,).
+        speed: Rate of the offset at the start (6,) or (n,).
         duration: [s].
         time: Since the start [s].
     """
 
     offset: NDArray[np.float64]
+    speed: NDArray[np.float64]
     duration: float
     time: float = 0.0
 
     def displace(self, sample: Any) -> Any:
         """The reference with what is left of the offset."""
-        s, ds = minimum_jerk(self.time / self.duration)
-        return sample.displaced(self.offset, 1.0 - s, -ds / self.duration)
+        T = self.duration
+        s, ds = minimum_jerk(self.time / T)
+        r, dr = run_out(self.time / T)
+        return sample.displaced((1.0 - s) * self.offset + r * T * self.speed, -ds / T * self.offset + dr * self.speed)
 
 
 class Recovery:
@@ -125,6 +138,7 @@ class Recovery:
         self.suspend_above = suspend_above
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
+        self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
         self._changed = True
         trajectories = {id(task.trajectory): task.trajectory for task in self.tasks}
         self._cursors = [
@@ -207,12 +221,22 @@ class Recovery:
         sample = task.trajectory.sample(self.path_time)
         if self.phase != FOLLOWING or self._rate < 1.0:
             sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
-        if self.phase == SUSPENDED or not self._pending[k]:
+        if not self._pending[k]:
+            return sample
+        if self.phase == SUSPENDED:
+            self._offsets[k] = sample.offset(value) if sample.finite else None
             return sample
         back = self._returns[k]
-        if back is None or not active >= 1.0:  # x_d,r is where the task is when it may return
-            offset = sample.offset(value)
-            back = Return(offset, self.rules.duration(offset, value.ndim == 1))
+        if back is None:  # x_d,r is where the task is when it may return
+            offset, joints = sample.offset(value), value.ndim == 1
+            before, self._offsets[k] = self._offsets[k], offset
+            if not active >= 1.0:  # held, not pulled
+                return sample.displaced(offset, np.zeros_like(offset))
+            rate = (offset - before) / self.dt if before is not None else np.zeros_like(offset)
+            back = Return(offset, self.rules.slowed(rate, joints), self.rules.duration(offset, joints))
+        elif not active >= 1.0:
+            self._returns[k], self._offsets[k] = None, sample.offset(value)
+            return sample.displaced(self._offsets[k], np.zeros_like(self._offsets[k]))
         else:
             back = replace(back, time=back.time + self.dt)
         self._returns[k] = back
@@ -260,3 +284,9 @@ def minimum_jerk(tau: float) -> tuple[float, float]:
     """s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ and ds/dτ for τ in [0, 1]: from rest to rest."""
     tau = min(max(tau, 0.0), 1.0)
     return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2
+
+
+def run_out(tau: float) -> tuple[float, float]:
+    """r(τ) = τ - 6 τ³ + 8 τ⁴ - 3 τ⁵ and dr/dτ for τ in [0, 1]: from speed 1 to rest where it began, as smoothly."""
+    tau = min(max(tau, 0.0), 1.0)
+    return tau - tau**3 * (6.0 - 8.0 * tau + 3.0 * tau**2), 1.0 - tau**2 * (18.0 - 32.0 * tau + 15.0 * tau**2)

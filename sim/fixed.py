@@ -18,9 +18,11 @@ from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.plant import Plant
 from qpsafe.sim.scene import Scene, build_scene
 from qpsafe.tasks.rotation import euler_zyx, log3
+from qpsafe.tasks.trajectory import FixedPose, Trajectory
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
+    from qpsafe.recovery import RecoveryRules
     from qpsafe.robot.robot import Robot
     from qpsafe.sensing.rules import SensingRules
 
@@ -42,6 +44,7 @@ class FixedExperiment:
         rules: What counts as danger, and what sick sensors do; None for the controller's default.
         cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it.
+        recovery: How the robot returns to its path; None for the controller's default.
     """
 
     robot: Robot
@@ -54,6 +57,7 @@ class FixedExperiment:
     rules: SensingRules | None = None
     cap: float | None = None
     choreography: Choreography = field(default_factory=Choreography)
+    recovery: RecoveryRules | None = None
 
     @cached_property
     def scene(self) -> Scene:
@@ -64,6 +68,16 @@ class FixedExperiment:
     def walk(self) -> Choreography:
         """The choreography as this seed varies it."""
         return self.choreography.varied(self.seed)
+
+    @cached_property
+    def reference(self) -> Trajectory:
+        """What the tool is to follow: in this experiment, to stay where it is."""
+        return FixedPose(self.robot.pose("tcp", self.robot.home))
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """Joint positions at the beginning (n,) [rad]."""
+        return self.robot.home
 
     def run(self, observer: Observer | None = None) -> RunLog:
         """Run it with the controller.
@@ -80,14 +94,14 @@ class FixedExperiment:
         recorder = Recorder(controller.dt, controller.spots.names)
         for _ in range(round(self.duration / controller.dt)):
             tick, q, qd, distances, state = loop.step()
-            pose = state.pose("tcp")
+            pose, goal = state.pose("tcp"), target.sample(tick.path_time).pose
             recorder.add(
                 tick,
                 q,
                 qd,
                 distances,
-                pose_error(pose, target.pose),
-                euler_error(robot.pose("tcp", tick.reference.q), target.pose),
+                pose_error(pose, goal),
+                euler_error(robot.pose("tcp", tick.reference.q), goal),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
             )
             if observer is not None:

@@ -17,7 +17,6 @@ from qpsafe.sim.plant import Plant
 from qpsafe.sim.sensor import make_sensor
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
-from qpsafe.tasks.trajectory import FixedPose
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
@@ -49,8 +48,8 @@ class FixedLoop:
     def __init__(self, experiment: FixedExperiment) -> None:
         robot, scene = experiment.robot, experiment.scene
         self.scene, self.walk = scene, experiment.walk
-        self.plant = Plant(scene, lag=experiment.lag)
-        self.target = FixedPose(robot.pose("tcp", robot.home))
+        self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)
+        self.target = experiment.reference
         tasks = [PositionTask("tcp", self.target), OrientationTask("tcp", self.target)]
         self.controller = SafetyController(
             robot,
@@ -59,6 +58,7 @@ class FixedLoop:
             limits="robot" if experiment.limits else None,
             sensing=experiment.rules,
             known=known_obstacles(scene),
+            recovery=experiment.recovery,
             barrier=None if experiment.cap is None else DangerBarrier(experiment.cap),
         )
         spots = self.controller.spots

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MEDIUM, HIGH = "#fff2a8", "#f6b7ae"
 _COMPONENT = (("#0b5fa5", "-"), ("#2a8c3c", "--"), ("#c0392b", "-."))
-_STYLE = {
+STYLE = {
     "font.size": 9,
     "axes.labelsize": 9,
     "axes.grid": True,
@@ -39,10 +39,10 @@ def figure_11(log: RunLog, path: Path, title: str = "") -> None:
     """
     import matplotlib
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure, axes = _figure(4, 7.2, 9.0, (1.75, 1.0, 1.0, 1.0))
         for axis in axes:
-            _shade(axis, log)
+            shade(axis, log)
         _distances(axes[0], log)
         _danger(axes[1], log)
         _components(axes[2], log, np.rad2deg(log.euler_error), ("φ", "θ", "ψ"), "(c) orientation\nerror [deg]")
@@ -51,21 +51,21 @@ def figure_11(log: RunLog, path: Path, title: str = "") -> None:
         axes[3].set_xlim(log.time[0], log.time[-1])
         if title:
             figure.suptitle(title, fontsize=10)
-        _save(figure, path)
+        save(figure, path)
 
 
 def distance_figure(log: RunLog, without: NDArray[np.float64], path: Path) -> None:
     """True smallest distance robot-board with the controller and with the robot keeping its pose."""
     import matplotlib
 
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure, (axis,) = _figure(1, 7.2, 3.0)
-        _shade(axis, log)
+        shade(axis, log)
         axis.plot(log.time, log.board_distance, color="#0b5fa5", label="with the controller")
         axis.plot(log.time, without[: len(log.time)], color="#555555", linestyle="--", label="robot keeps its pose")
         axis.set(xlabel="time [s]", ylabel="robot to board [m]", xlim=(log.time[0], log.time[-1]), ylim=(0.0, None))
         _legend(axis)
-        _save(figure, path)
+        save(figure, path)
 
 
 def _distances(axis: Axes, log: RunLog) -> None:
@@ -106,7 +106,8 @@ def _legend(axis: Axes, **options: Any) -> None:
         axis.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0, **options)
 
 
-def _shade(axis: Axes, log: RunLog) -> None:
+def shade(axis: Axes, log: RunLog) -> None:
+    """Medium danger yellow, high danger red."""
     for item in log.intervals():
         if item.name in ("medium", "high"):
             axis.axvspan(item.start, item.end, color=MEDIUM if item.name == "medium" else HIGH, linewidth=0)
@@ -126,7 +127,7 @@ def _figure(rows: int, width: float, height: float, ratios: tuple[float, ...] | 
     return figure, figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
 
 
-def _save(figure: Any, path: Path) -> None:
+def save(figure: Any, path: Path) -> None:
     """Write whole or not at all."""
     part = path.with_name("." + path.name)
     try:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.tasks.rotation import exp3, is_rotation, log3
+from qpsafe.tasks.rotation import exp3, exp3_jacobian, is_rotation, log3
 
 
 class Sample(NamedTuple):
@@ -35,14 +35,14 @@ class Sample(NamedTuple):
         """How far a pose is from the reference: shift, then rotation vector, world axes (6,) [m, rad]."""
         return np.concatenate((value[:3, 3] - self.pose[:3, 3], log3(value[:3, :3] @ self.pose[:3, :3].T)))
 
-    def displaced(self, offset: NDArray[np.float64], share: float, rate: float) -> Sample:
-        """The reference moved by `share` of an offset, while that share changes by `rate` [1/s]."""
-        turn = exp3(share * offset[3:])
+    def displaced(self, offset: NDArray[np.float64], rate: NDArray[np.float64]) -> Sample:
+        """The reference moved by an offset (6,) that changes by `rate` (6,) [m/s, rad/s]."""
+        turn = exp3(offset[3:])
         pose = np.eye(4)
-        pose[:3, 3] = self.pose[:3, 3] + share * offset[:3]
+        pose[:3, 3] = self.pose[:3, 3] + offset[:3]
         pose[:3, :3] = turn @ self.pose[:3, :3]
-        angular = turn @ self.twist[3:] + rate * offset[3:]
-        return Sample(pose, np.concatenate((self.twist[:3] + rate * offset[:3], angular)))
+        angular = turn @ self.twist[3:] + exp3_jacobian(offset[3:]) @ rate[3:]
+        return Sample(pose, np.concatenate((self.twist[:3] + rate[:3], angular)))
 
 
 class JointSample(NamedTuple):
@@ -69,9 +69,9 @@ class JointSample(NamedTuple):
         """How far joint positions are from the reference (n,) [rad]."""
         return value - self.position
 
-    def displaced(self, offset: NDArray[np.float64], share: float, rate: float) -> JointSample:
-        """The reference moved by `share` of an offset, while that share changes by `rate` [1/s]."""
-        return JointSample(self.position + share * offset, self.velocity + rate * offset)
+    def displaced(self, offset: NDArray[np.float64], rate: NDArray[np.float64]) -> JointSample:
+        """The reference moved by an offset (n,) that changes by `rate` (n,) [rad/s]."""
+        return JointSample(self.position + offset, self.velocity + rate)
 
 
 class Trajectory(Protocol):

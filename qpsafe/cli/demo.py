@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json as json_module
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,20 +20,17 @@ from qpsafe.cli.common import (
     progress_bar,
     write_text,
 )
+from qpsafe.cli.demo_path import path
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress
 
-    from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.fixed import FixedExperiment, Observer
     from qpsafe.sim.log import RunLog
     from qpsafe.sim.report import Report
 
 app = typer.Typer(help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
-
-
-@app.callback()
-def _group() -> None:
-    """Keep `fixed` a command of its own while it is the only one."""
 
 
 @app.command()
@@ -88,7 +86,20 @@ def fixed(
 def _run(
     experiment: FixedExperiment, title: str, path: Path, video: bool, view: bool, screen: Console
 ) -> tuple[RunLog, bool]:
-    """Run with a progress bar, filmed if possible; says in one line why not."""
+    """Run with a progress bar, filmed if possible."""
+    label = f"{experiment.duration:g} s, 250 Hz"
+    with (
+        progress_bar(screen) as progress,
+        observed(experiment, path, video, view, screen, progress, label) as (observer, filmed),
+    ):
+        return experiment.run(observer), filmed
+
+
+@contextmanager
+def observed(
+    experiment: FixedExperiment, path: Path, video: bool, view: bool, screen: Console, progress: Progress, label: str
+) -> Iterator[tuple[Observer, bool]]:
+    """What to call at every tick to film, show and count it, and whether it is filmed; says in one line why not."""
     from qpsafe.danger.activation import Activation
     from qpsafe.errors import MissingExtraError
     from qpsafe.sensing.spots import load_spots
@@ -115,15 +126,14 @@ def _run(
             viewer = Viewer(experiment.scene, spots, Activation())
             stack.callback(viewer.close)
             observers.append(viewer.observe)
-        progress = stack.enter_context(progress_bar(screen))
-        task = progress.add_task(f"{experiment.duration:g} s, 250 Hz", total=round(experiment.duration / 0.004))
+        task = progress.add_task(label, total=round(experiment.duration / 0.004))
 
         def observe(*state: Any) -> None:
             for observer in observers:
                 observer(*state)
             progress.advance(task)
 
-        return experiment.run(observe), filmed
+        yield observe, filmed
 
 
 def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> Report:
@@ -146,7 +156,7 @@ def show(report: Report, title: str, screen: Console) -> None:
 
     table = Table(title=f"First experiment, {title}: largest errors in each regime, commanded and measured pose")
     table.add_column("danger")
-    units = ("entered, s", "left, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad")
+    units = ("from, s", "to, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad")
     for heading in units:
         table.add_column(heading, justify="right")
     colours = {"low": "green", "medium": "yellow", "high": "red"}
@@ -185,3 +195,6 @@ def show(report: Report, title: str, screen: Console) -> None:
         f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else ""),
         highlight=False,
     )
+
+
+app.command()(path)

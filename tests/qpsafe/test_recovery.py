@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.recovery import FOLLOWING, RECOVERING, SUSPENDED, Recovery, RecoveryRules, minimum_jerk
+from qpsafe.recovery import FOLLOWING, RECOVERING, SUSPENDED, Recovery, RecoveryRules, minimum_jerk, run_out
 from qpsafe.tasks.joint import PostureTask
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
@@ -79,11 +79,13 @@ class World:
             phases.append(self.recovery.phase)
         return phases
 
-    def push(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
-        """Evasion led away."""
+    def push(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0, rest: bool = True) -> None:
+        """Evasion led away, and came to rest while danger was still there."""
         self.pose = self.pose.copy()
         self.pose[:2, 3] += x, y
         self.pose[:3, :3] = exp3(np.array([0.0, 0.0, turn])) @ self.pose[:3, :3]
+        if rest:
+            self.run(1, DANGEROUS)
 
     @property
     def stopped(self) -> np.ndarray:
@@ -134,6 +136,28 @@ def test_references_are_continuous_and_their_twist_is_their_derivative_from_reco
         assert step == pytest.approx(world.samples[0].twist[:3] * DT, abs=3e-5)
         last = world.samples[0].pose
     assert world.recovery.phase == FOLLOWING
+    assert world.pose == pytest.approx(world.stopped, abs=1e-9)
+
+
+def test_a_return_begins_with_the_speed_of_the_robot() -> None:
+    """What is left of the evasive motion runs out: neither the reference nor its speed jumps at x_d,r."""
+    world = World()
+    world.run(10, SAFE)
+    world.run(1, DANGEROUS)
+    for _ in range(5):
+        world.push(y=0.1 * DT, turn=0.3 * DT)
+    before = world.pose
+    world.push(y=0.1 * DT, turn=0.3 * DT, rest=False)
+    world.run(1, SAFE)
+    assert world.samples[0].pose == pytest.approx(world.pose)
+    assert world.samples[0].twist[:3] == pytest.approx((world.pose - before)[:3, 3] / DT)
+    assert world.samples[1].twist[3:] == pytest.approx([0.0, 0.0, 0.3])
+    last = world.samples[0]
+    while world.run(1, SAFE) == [RECOVERING]:
+        assert world.samples[0].pose[:3, 3] - last.pose[:3, 3] == pytest.approx(
+            0.5 * DT * (world.samples[0].twist + last.twist)[:3], abs=1e-5
+        )
+        last = world.samples[0]
     assert world.pose == pytest.approx(world.stopped, abs=1e-9)
 
 
@@ -199,7 +223,7 @@ def test_a_pause_ramps_the_clock_to_rest_and_resumes_where_it_stopped() -> None:
 
 def test_an_event_waits_until_the_tasks_are_met() -> None:
     world = World()
-    world.push(turn=0.1)  # as if the orientation had been released
+    world.push(turn=0.1, rest=False)  # as if the orientation had been released
     for _ in range(50):
         world.run(1, MEDIUM)
     assert world.events == []
@@ -223,7 +247,7 @@ def test_no_event_is_lost_or_doubled_and_the_clock_never_goes_back(spells: list)
     for danger, ticks, paused, shift in spells:
         world.recovery.paused = paused
         if danger == DANGEROUS:
-            world.push(y=shift, turn=3.0 * shift)
+            world.push(y=shift, turn=3.0 * shift, rest=paused)
         for _ in range(ticks):
             (phase,) = world.run(1, danger)
             assert (phase == SUSPENDED) == (danger == DANGEROUS)
@@ -285,4 +309,7 @@ def test_minimum_jerk_goes_from_rest_to_rest_and_its_derivative_is_right() -> No
     for tau in np.linspace(0.01, 0.99, 9):
         difference = (minimum_jerk(tau + 1e-6)[0] - minimum_jerk(tau - 1e-6)[0]) / 2e-6
         assert minimum_jerk(tau)[1] == pytest.approx(difference, abs=1e-8)
+        difference = (run_out(tau + 1e-6)[0] - run_out(tau - 1e-6)[0]) / 2e-6
+        assert run_out(tau)[1] == pytest.approx(difference, abs=1e-8)
+    assert (run_out(0.0), run_out(1.0)) == ((0.0, 1.0), (0.0, 0.0))
     assert max(minimum_jerk(t)[1] for t in np.linspace(0, 1, 1001)) == pytest.approx(15.0 / 8.0)

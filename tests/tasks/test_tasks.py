@@ -133,21 +133,21 @@ def test_a_displaced_reference_is_the_actual_value_and_fades_to_the_reference() 
     rng = np.random.default_rng(3)
     sample, actual = Sample(random_pose(rng), rng.normal(size=6)), random_pose(rng)
     offset = sample.offset(actual)
-    assert sample.displaced(offset, 1.0, 0.0).pose == pytest.approx(actual, abs=1e-12)
-    assert sample.displaced(offset, 0.0, 0.0).pose == pytest.approx(sample.pose, abs=1e-15)
-    assert sample.displaced(offset, 0.0, 0.0).twist == pytest.approx(sample.twist, abs=1e-15)
+    assert sample.displaced(offset, np.zeros(6)).pose == pytest.approx(actual, abs=1e-12)
+    assert sample.displaced(np.zeros(6), np.zeros(6)).pose == pytest.approx(sample.pose, abs=1e-15)
+    assert sample.displaced(np.zeros(6), np.zeros(6)).twist == pytest.approx(sample.twist, abs=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_twist_of_a_displaced_moving_reference_is_the_derivative_of_its_pose(seed: int) -> None:
     rng, h = np.random.default_rng(seed), 1e-6
-    start, twist, offset = random_pose(rng), rng.normal(size=6), rng.normal(size=6)
+    start, twist, offset, rate = random_pose(rng), *rng.normal(size=(3, 6))
 
     def at(t: float) -> Sample:
         pose = start.copy()
         pose[:3, 3] += t * twist[:3]
         pose[:3, :3] = exp3(t * twist[3:]) @ start[:3, :3]
-        return Sample(pose, twist).displaced(offset, 0.7 - 0.4 * t, -0.4)
+        return Sample(pose, twist).displaced(offset + t * rate, rate)
 
     before, after = at(-h).pose, at(h).pose
     found = np.concatenate(((after - before)[:3, 3], log3(after[:3, :3] @ before[:3, :3].T))) / (2 * h)

@@ -1,0 +1,127 @@
+"""`qpsafe demo path`: the second experiment with three laws side by side."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar, write_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.path_report import PathFigures
+    from qpsafe.sim.report import Check
+
+
+def path(
+    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    lag: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+    ] = 0.0,
+    duration: Annotated[float, typer.Option(min=3.0, max=600.0, help="Length of each run [s].")] = 45.0,
+    program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-path"),
+    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Second experiment: follow a line back and forth while a person with a card board comes and goes.
+
+    Four runs: the hierarchical law (strict, and with the source's projection), the null-space law, and strict without
+    suspension and recovery.
+    """
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.cli.demo import observed
+    from qpsafe.laws.hierarchical import HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw
+    from qpsafe.recovery import RecoveryRules
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.path import PROGRAM, PathExperiment
+    from qpsafe.sim.path_plots import side_by_side
+    from qpsafe.sim.path_report import figures, promises, to_dict
+    from qpsafe.sim.plots import figure_11
+
+    robot, strict = load_robot("irb140"), HierarchicalLaw(solver=solver)
+    laws = {
+        "strict": strict,
+        "paper": HierarchicalLaw("paper", solver=solver),
+        "nullspace": NullspaceLaw(),
+        "strict, no recovery": strict,
+    }
+    experiments = {
+        name: PathExperiment(
+            robot,
+            law,
+            seed=seed,
+            lag=lag,
+            duration=duration,
+            recovery=RecoveryRules(enabled="no recovery" not in name),
+            program=PROGRAM if program is None else program,
+        )
+        for name, law in laws.items()
+    }
+    first = experiments["strict"]
+    length = first.reference.duration  # a wrong program is refused before anything is written or run
+    screen.print(f"{first.program.name}: one cycle takes {length:.1f} s", style="dim", highlight=False)
+    out.mkdir(parents=True, exist_ok=True)
+    runs, found = {}, {}
+    with progress_bar(screen) as progress:
+        for name, experiment in experiments.items():
+            shown = video and name == "strict", view and name == "strict"
+            with observed(experiment, out / "video.mp4", *shown, screen, progress, name) as (observer, _):
+                runs[name] = experiment.run_path(observer)
+            found[name] = figures(runs[name], robot)
+            runs[name].log.write_csv(out / f"signals-{name.replace(', ', '-').replace(' ', '-')}.csv")
+    others = {name: found[name] for name in ("paper", "nullspace")}
+    checks = promises(found["strict"], found["strict, no recovery"], others)
+    result = to_dict(found, checks)
+    figure_11(runs["strict"].log, out / "figure.png", "Second experiment, hierarchical law, strict projection")
+    side_by_side({name: run for name, run in runs.items() if "," not in name}, robot, out / "side-by-side.png")
+    write_text(out / "report.json", json_module.dumps(result, indent=2) + "\n")
+    if json:
+        print_json(result)
+    else:
+        show(found, checks, screen)
+        screen.print(f"written to {out}: figure.png, side-by-side.png, report.json, signals-*.csv", highlight=False)
+    if not result["kept"]:
+        raise typer.Exit(1)
+
+
+def show(found: dict[str, PathFigures], checks: list[Check], screen: Console) -> None:
+    """Print figures and promises as tables."""
+    from rich.table import Table
+
+    rows: list[tuple[str, Any]] = [
+        ("on the line, low danger, constant speed: orientation error [rad]", lambda f: f"{f.line_orientation:.2g}"),
+        ("... position error [mm]", lambda f: f"{1e3 * f.line_position:.3f}"),
+        ("along the line, medium danger: position error [mm]", lambda f: f"{1e3 * f.medium_position:.3f}"),
+        ("largest step of q̇ [a_max dt]", lambda f: f"{f.step:.6f}"),
+        ("ticks clipped to the limits", lambda f: str(f.clipped)),
+        ("on the way back: joint speed [limit]", lambda f: f"{f.return_speed:.3f}"),
+        ("... joint acceleration [limit]", lambda f: f"{f.return_acceleration:.3f}"),
+        ("... joint speed, evasion braked [limit]", lambda f: f"{f.smooth_speed:.3f}"),
+        ("... joint acceleration, evasion braked [limit]", lambda f: f"{f.smooth_acceleration:.3f}"),
+        ("path goes on at [mm] from where it stopped", lambda f: f"{1e3 * f.resumed:.3f}"),
+        ("suspensions", lambda f: str(f.suspensions)),
+        ("path travelled [s]", lambda f: f"{f.travelled:.2f}"),
+    ]
+    table = Table(title="Second experiment: largest figures of each run")
+    table.add_column("")
+    for name in found:
+        table.add_column(name, justify="right")
+    for label, text in rows:
+        table.add_row(label, *(text(item) for item in found.values()))
+    screen.print(table)
+    table = Table(title="What the runs should show")
+    for heading in ("", "", "measured", "promised"):
+        table.add_column(heading, overflow="fold")
+    for check in checks:
+        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
+        table.add_row(mark, check.name, check.measured, check.promised)
+    screen.print(table)
