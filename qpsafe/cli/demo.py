@@ -48,6 +48,9 @@ def fixed(
     sensor: Annotated[
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
+    cap: Annotated[
+        float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default it is not.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -66,6 +69,7 @@ def fixed(
         lag=lag,
         duration=duration,
         sensor=sensor.value,
+        cap=cap,
     )
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
     out.mkdir(parents=True, exist_ok=True)

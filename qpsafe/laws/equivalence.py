@@ -117,10 +117,23 @@ def random_states(count: int, seed: int = 0) -> Iterator[State]:
 
 @dataclass(frozen=True)
 class Deviation:
-    """Deviations of a law from eq. (22) over states of one kind: max-norms of the difference in q̇ [rad/s]."""
+    """Deviations of a law from eq. (22) over states of one kind.
+
+    Attributes:
+        kind: Of the states.
+        values: Max-norms of the difference in q̇, one per state [rad/s].
+        speeds: Max-norms of q̇ itself [rad/s]. A random pose may lie so near to a singular one that it asks for 1e5
+            rad/s, where the rounding errors of any method, (22) included, grow in proportion.
+    """
 
     kind: str
     values: _Matrix
+    speeds: _Matrix
+
+    @property
+    def scaled(self) -> _Matrix:
+        """Deviations divided by the speed where that is above 1 rad/s: what a tolerance is compared with."""
+        return self.values / np.maximum(self.speeds, 1.0)
 
     @property
     def worst(self) -> float:
@@ -152,14 +165,16 @@ def compare_states(
     Returns:
         One entry per kind of state, in order of appearance.
     """
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[tuple[float, float]]] = {}
     for i, state in enumerate(random_states(count, seed)):
         bound = None
         if with_limits:
             corners = [state._replace(m=m, f=f).source_velocity() for m, f in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))]
             bound = 1.0 + max(float(np.abs(qd).max()) for qd in corners)
-        difference = law.solve(state.problem(bound)).qd - state.source_velocity()
-        found.setdefault(state.kind, []).append(float(np.abs(difference).max()))
+        source = state.source_velocity()
+        difference = law.solve(state.problem(bound)).qd - source
+        norms = float(np.abs(difference).max()), float(np.abs(source).max())
+        found.setdefault(state.kind, []).append(norms)
         if progress is not None:
             progress(i + 1)
-    return [Deviation(kind, np.array(values)) for kind, values in found.items()]
+    return [Deviation(kind, *np.array(norms).T) for kind, norms in found.items()]
