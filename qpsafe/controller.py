@@ -103,7 +103,7 @@ class SafetyController:
         self._seq = -1
         self._active = False
         self._q = self.robot.home.copy()
-        self._qd = np.zeros(self.robot.nq)
+        self._qd, self._qdd = np.zeros(self.robot.nq), np.zeros(self.robot.nq)
 
     def acknowledge(self) -> None:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
@@ -213,11 +213,11 @@ class SafetyController:
             tasks.append(TaskVelocity(task.jacobian(commanded), task.velocity(error, sample)))
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        box = self.limits.box(self._q, self._qd) if self.limits else None
-        bounds = (box.lower.copy(), box.upper.copy()) if box else (None, None)
+        box = self.limits.box(self._q, self._qd, self._qdd) if self.limits else None
+        lower, upper = (box.lower.copy(), box.upper.copy()) if box else (None, None)
         barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
         soft = (barrier,) if barrier else ()
-        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, *bounds, soft))
+        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, lower, upper, soft))
         status, messages, command = self._inside(checked_velocity(result, self._q, self.dt), box)
         if result.status != "solved":
             status, messages = DEGRADED, (*messages, f"law: {result.status}")
@@ -291,6 +291,7 @@ class SafetyController:
         )
 
     def _advance(self, command: NDArray[np.float64]) -> None:
+        self._qdd = (command - self._qd) / self.dt
         self._qd = command
         self._q = self._q + command * self.dt
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +149,10 @@ def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: 
     return merged
 
 
+#: Fields of `RunLog` in the order of a recorded row.
+_RECORDED = tuple(f.name for f in fields(RunLog) if f.name not in ("dt", "messages", "spot_names"))
+
+
 class Recorder:
     """Collects ticks and turns them into a `RunLog`."""
 
@@ -206,5 +210,6 @@ class Recorder:
 
     def finish(self) -> RunLog:
         """The run so far as arrays."""
-        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
-        return RunLog(self.dt, *columns, messages=tuple(self._messages), spot_names=self.spot_names)
+        columns = (np.array(column) for column in zip(*self._rows, strict=True))
+        arrays: dict[str, Any] = dict(zip(_RECORDED, columns, strict=True))
+        return RunLog(dt=self.dt, messages=tuple(self._messages), spot_names=self.spot_names, **arrays)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,8 +11,10 @@ from qpsafe.cli.common import console, print_json, progress_bar
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
 
     from qpsafe.laws.equivalence import Deviation
+    from qpsafe.laws.problem import Law
     from qpsafe.sim.compare import ClosedLoop
 
 
@@ -37,7 +40,7 @@ def compare(
     from qpsafe.laws.weighted import WeightedLaw
 
     paper = HierarchicalLaw("paper", solver=solver)
-    runs = {
+    runs: dict[str, tuple[Law, int, bool]] = {
         "paper": (paper, states, False),
         "paper, limits inactive": (paper, states, True),
         "null-space law": (NullspaceLaw(), states // 10, False),
@@ -49,9 +52,7 @@ def compare(
     with progress_bar(screen) as progress:
         for name, (law, count, limits) in runs.items():
             task = progress.add_task(name, total=count)
-            found[name] = compare_states(
-                law, count, seed, limits, lambda done, task=task: progress.update(task, completed=done)
-            )
+            found[name] = compare_states(law, count, seed, limits, partial(_completed, progress, task))
         if closed_loop:
             from qpsafe.robot.loader import load_robot
             from qpsafe.sim.compare import compare_closed_loop
@@ -79,6 +80,10 @@ def compare(
         _show(found, loop, tolerance, good, screen)
     if not good:
         raise typer.Exit(1)
+
+
+def _completed(progress: Progress, task: TaskID, done: int) -> None:
+    progress.update(task, completed=done)
 
 
 def _show(

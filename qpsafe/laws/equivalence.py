@@ -112,7 +112,8 @@ def random_states(count: int, seed: int = 0) -> Iterator[State]:
             kind, J_H, J_L = next(robot_states)
         n = J_H.shape[1]
         m, f = (float(rng.choice((0.0, 1.0, rng.uniform()))) for _ in range(2))
-        yield State(kind, J_H, J_L, rng.normal(size=len(J_H)), rng.normal(size=len(J_L)), rng.normal(size=n), m, f)
+        xd_H, xd_L, qd0 = (rng.normal(size=size) for size in (len(J_H), len(J_L), n))
+        yield State(kind, J_H, J_L, xd_H, xd_L, qd0, m=m, f=f)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
+from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
@@ -71,6 +73,7 @@ class HierarchicalLaw:
     def _solve_regime(self, problem: LawProblem, kept: int) -> Solution:
         """Solve the hierarchy that keeps the first `kept` tasks; equality levels are (A, b) pairs."""
         identity = _identity(len(problem.qd0))
+        levels: list[Level | Sequence[NDArray[np.float64]]]
         if self.projection == "strict" or kept < 2:
             levels = [*problem.soft, *problem.tasks[:kept], (identity, problem.qd0)]  # E closes every hierarchy
         else:

@@ -14,7 +14,7 @@ RANK_TOLERANCE = 1e-10
 
 def pseudoinverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
     """Moore-Penrose pseudoinverse P(A), (n, rows), of A (rows, n); A may be rank-deficient or have no rows."""
-    return np.linalg.pinv(A, rcond=RANK_TOLERANCE)
+    return np.asarray(np.linalg.pinv(A, rcond=RANK_TOLERANCE), dtype=np.float64)
 
 
 def nullspace_velocity(

@@ -46,12 +46,14 @@ PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
 
 def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q (n,) [rad], finite and not absurd, as an array of its own; or BadInput."""
-    return _as_joint_vector("q", value, *_plausible(robot)[:2], robot.joint_names)
+    lowest, highest, _, _ = _plausible(robot)
+    return _as_joint_vector("q", value, lowest, highest, robot.joint_names)
 
 
 def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q̇ (n,) [rad/s], finite and not absurd, as an array of its own; or BadInput."""
-    return _as_joint_vector("qd", value, *_plausible(robot)[2:], robot.joint_names)
+    _, _, lowest, highest = _plausible(robot)
+    return _as_joint_vector("qd", value, lowest, highest, robot.joint_names)
 
 
 @functools.lru_cache(maxsize=16)

@@ -136,3 +136,22 @@ def test_wrong_limits_are_refused_by_name(change: dict, key: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         JointLimits(**values)
     assert caught.value.key == key
+
+
+def test_controller_gives_the_jerk_limit_the_last_acceleration() -> None:
+    """A point appears before the tool: the commanded acceleration rises by at most jerk dt from tick to tick."""
+    import qpsafe
+
+    robot = qpsafe.load_robot("irb140")
+    here = qpsafe.FixedPose(robot.pose("tcp", robot.home))
+    jerk = robot.max_acceleration / 0.02
+    limits = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, DT, max_jerk=jerk)
+    tasks = [qpsafe.PositionTask("tcp", here), qpsafe.OrientationTask("tcp", here)]
+    controller = qpsafe.SafetyController(robot, tasks, limits=limits)
+    q, qd = robot.home, [np.zeros(6)]
+    for _ in range(60):
+        tick = controller.step(q, qd[-1], points=[here.pose[:3, 3] + [0.25, 0.0, 0.0]])
+        q, qd = tick.reference.q, [*qd, tick.reference.qd]
+    qdd = np.diff(np.array(qd), axis=0) / DT
+    assert np.abs(qdd).max() > 1.0  # it does move
+    assert (np.abs(np.diff(qdd, axis=0)) <= jerk * DT * (1.0 + 1e-9) + 1e-6).all()
