@@ -53,9 +53,11 @@ def side_by_side(runs: Mapping[str, PathRun], robot: Robot, path: Path) -> None:
             axis.set_ylabel(label)
         axes[0, 0].set_ylim(0.0, None)
         axes[4, 0].set_ylim(0.0, None)
+        low_end, high_end = axes[3, 0].get_ylim()
+        axes[3, 0].set_ylim(low_end - 0.25 * (high_end - low_end), high_end)  # room for the legend
         axes[1, 0].axhline(1e-3, color="#c0392b", linewidth=0.8)
         axes[2, 0].axhline(2.0, color="#c0392b", linewidth=0.8)
-        axes[3, 0].legend(loc="lower left")
+        axes[3, 0].legend(loc="lower left", ncols=2)
         for word, colour in (("medium danger", MEDIUM), ("high danger", HIGH)):
             axes[0, 0].fill_between([], [], color=colour, label=word)
         axes[0, 0].legend(loc="upper left")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -80,7 +81,7 @@ def figures(run: PathRun, robot: Robot) -> PathFigures:
 
 
 def on_line(run: PathRun) -> Flags:
-    """Ticks (N,) at constant speed for at least `SETTLED` seconds, after `CALM` seconds of low danger or none before."""
+    """Ticks (N,) at constant speed for at least `SETTLED` seconds, after `CALM` of low danger or before any other."""
     log = run.log
     low = _lasting((log.regime == "low") & (log.phase == FOLLOWING), round(CALM / log.dt))
     first = np.flatnonzero(log.regime != "low")
@@ -139,10 +140,15 @@ def promises(strict: PathFigures, without: PathFigures | None, others: Mapping[s
 def to_dict(found: Mapping[str, PathFigures], checks: list[Check]) -> dict[str, Any]:
     """For JSON."""
     return {
-        "laws": {name: asdict(item) for name, item in found.items()},
+        "laws": {name: {key: _or_none(value) for key, value in asdict(item).items()} for name, item in found.items()},
         "checks": [check._asdict() for check in checks],
         "kept": all(check.kept for check in checks),
     }
+
+
+def _or_none(value: float) -> float | None:
+    """JSON has no NaN."""
+    return None if math.isnan(value) else value
 
 
 def _largest(values: NDArray[np.float64], where: Flags) -> float:

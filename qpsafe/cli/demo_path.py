@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -107,7 +108,7 @@ def show(found: dict[str, PathFigures], checks: list[Check], screen: Console) ->
         ("... joint acceleration [limit]", lambda f: f"{f.return_acceleration:.3f}"),
         ("... joint speed, evasion braked [limit]", lambda f: f"{f.smooth_speed:.3f}"),
         ("... joint acceleration, evasion braked [limit]", lambda f: f"{f.smooth_acceleration:.3f}"),
-        ("path goes on at [mm] from where it stopped", lambda f: f"{1e3 * f.resumed:.3f}"),
+        ("path goes on at [mm] from where it stopped", lambda f: "-" if isnan(f.resumed) else f"{1e3 * f.resumed:.3f}"),
         ("suspensions", lambda f: str(f.suspensions)),
         ("path travelled [s]", lambda f: f"{f.travelled:.2f}"),
     ]

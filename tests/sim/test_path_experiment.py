@@ -1,5 +1,6 @@
 """The source's second experiment, shortened: one approach from the front while the tool follows its line."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,7 +90,9 @@ def test_the_report_names_what_is_not_kept(strict: PathRun, without: PathRun, nu
     worse = replace(found["a"], step=1.1, resumed=2e-3, line_orientation=float("nan"))
     broken = [check.name for check in promises(worse, found["b"], {"nullspace": found["c"]}) if not check.kept]
     assert len(broken) == 3
-    assert not to_dict(found, promises(worse, None, {}))["kept"]
+    report = to_dict(found, promises(worse, None, {}))
+    assert not report["kept"]
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
 
 
 def test_the_figure_is_drawn(strict: PathRun, tmp_path: Path) -> None:
