@@ -120,6 +120,7 @@ class Recovery:
         self.paused = False
         self._rate = 1.0  # of the clock
         self._changed = False
+        self._cursors: list[_Cursor] = []
         self.set_tasks(tasks, suspend_above, restart=True)
         self._changed = False
 

@@ -14,6 +14,7 @@ from qpsafe.cli.common import console, print_json, progress_bar, write_text
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from qpsafe.laws.problem import Law
     from qpsafe.sim.path_report import PathFigures
     from qpsafe.sim.report import Check
 
@@ -49,7 +50,7 @@ def path(
     from qpsafe.sim.plots import figure_11
 
     robot, strict = load_robot("irb140"), HierarchicalLaw(solver=solver)
-    laws = {
+    laws: dict[str, Law] = {
         "strict": strict,
         "paper": HierarchicalLaw("paper", solver=solver),
         "nullspace": NullspaceLaw(),
