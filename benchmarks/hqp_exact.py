@@ -154,13 +154,14 @@ class Exact:
             across = self.fixed + [self.normals[c] for c in self.held]
             system = [[Fraction(row[j]) for row in across] + [gradient[j]] for j in range(n)]
             multiplier = solve_consistent(system, len(across))[len(self.fixed) :]
-            wrong = next((c for (c, s), m in zip(self.held.items(), multiplier, strict=True) if m * s > 0), None)
-            if wrong is not None:
+            pushing = [c for (c, s), m in zip(self.held.items(), multiplier, strict=True) if m * s > 0]
+            if pushing:
+                wrong = min(pushing)  # Bland
                 del self.held[wrong]
                 continue
-            out = next((i for i, s in side.items() if residual[i] * s > 0), None)
-            if out is not None:
-                del side[out]
+            leaving = [i for i, s in side.items() if residual[i] * s > 0]
+            if leaving:
+                del side[min(leaving)]
                 continue
             break
         for i, row in enumerate(rows):

@@ -79,7 +79,7 @@ def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") ->
     if _solve_packed is None:  # the first use: it brings numba
         from qpsafe.hqp.own_solver import solve_packed
 
-        _solve_packed = solve_packed
+        _solve_packed, begin = solve_packed, perf_counter()
     qd, info = _solve_packed(*problem, damping)
     code, turns, where = info[:3].tolist()
     status = _STATUS[code]
