@@ -25,8 +25,9 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-bench: $(VENV)/.demo
+bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --json bench.json
+	$(BIN)/python benchmarks/bench_hqp.py --json bench-hqp.json
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; ok = (3, 11) <= sys.version_info[:2] <= (3, 14); sys.exit(0 if ok else "qpsafe needs Python 3.11 to 3.14, found " + sys.version.split()[0] + "; try: make PYTHON=python3.12")'
@@ -40,5 +41,9 @@ $(VENV)/.dev: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@ $(VENV)/.demo
 
+$(VENV)/.bench: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[video,bench]'
+	@touch $@
+
 clean:
-	rm -rf $(VENV) out build *.egg-info bench.json
+	rm -rf $(VENV) out build *.egg-info bench.json bench-hqp.json
