@@ -227,6 +227,8 @@ class Recovery:
         if self.phase == SUSPENDED:
             self._offsets[k] = sample.offset(value) if sample.finite else None
             return sample
+        if not sample.finite:  # never into an offset, which remembers
+            raise ValueError(f"the trajectory of the {task.name} task is not finite")
         back = self._returns[k]
         if back is None:  # x_d,r is where the task is when it may return
             offset, joints = sample.offset(value), value.ndim == 1
