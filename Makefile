@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= out/demo-fixed
 
-.PHONY: demo test test-slow dev lint bench clean
+.PHONY: demo test test-slow dev links lint bench clean
 
 demo: $(VENV)/.demo ## the source's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
@@ -15,15 +15,18 @@ test: $(VENV)/.dev
 test-slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2
 
-dev: $(VENV)/.dev ## everything for working on the project, and links that static checkers follow
-	ln -sfn ../tasks qpsafe/tasks
-	ln -sfn ../robots qpsafe/robots
-	ln -sfn ../sim qpsafe/sim
+dev: $(VENV)/.dev links ## everything for working on the project
 	@echo "ready: $(BIN)/qpsafe --help"
 
-lint: $(VENV)/.dev
+lint: $(VENV)/.dev links
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy -p qpsafe
+
+links: ## git-ignored: static checkers do not follow setuptools' package-dir
+	@ln -sfn ../tasks qpsafe/tasks
+	@ln -sfn ../robots qpsafe/robots
+	@ln -sfn ../sim qpsafe/sim
 
 bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --json bench.json

@@ -18,15 +18,21 @@ _PUBLIC = {
     "DangerField": "qpsafe.danger.field",
     "Evasion": "qpsafe.danger.evasion",
     "FixedPose": "qpsafe.tasks.trajectory",
+    "FrameTask": "qpsafe.tasks.frame",
     "HierarchicalLaw": "qpsafe.laws.hierarchical",
     "JointLimits": "qpsafe.limits",
     "JointReference": "qpsafe.reference",
+    "JointTask": "qpsafe.tasks.joint",
     "Level": "qpsafe.hqp.level",
     "NullspaceLaw": "qpsafe.laws.nullspace",
     "Obstacle": "qpsafe.sensing.hulls",
     "OrientationTask": "qpsafe.tasks.orientation",
     "PositionTask": "qpsafe.tasks.position",
+    "PostureTask": "qpsafe.tasks.joint",
+    "Program": "qpsafe.tasks.program",
     "QpsafeError": "qpsafe.errors",
+    "RecoveryRules": "qpsafe.recovery",
+    "RelativeFrameTask": "qpsafe.tasks.frame",
     "RobotFileError": "qpsafe.errors",
     "SafetyController": "qpsafe.controller",
     "SensingRules": "qpsafe.sensing.rules",
@@ -37,6 +43,7 @@ _PUBLIC = {
     "Wire": "qpsafe.robot.wire",
     "bundled_robots": "qpsafe.robot.loader",
     "load_converter": "qpsafe.sensing.calibration",
+    "load_program": "qpsafe.tasks.program_file",
     "load_robot": "qpsafe.robot.loader",
     "load_spots": "qpsafe.sensing.spots",
     "nullspace_velocity": "qpsafe.laws.nullspace",
@@ -62,6 +69,7 @@ if TYPE_CHECKING:
     from qpsafe.laws.nullspace import nullspace_velocity as nullspace_velocity
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
     from qpsafe.limits import JointLimits as JointLimits
+    from qpsafe.recovery import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference
     from qpsafe.robot.loader import bundled_robots as bundled_robots
     from qpsafe.robot.loader import load_robot as load_robot
@@ -71,8 +79,14 @@ if TYPE_CHECKING:
     from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
     from qpsafe.sensing.spots import load_spots as load_spots
+    from qpsafe.tasks.frame import FrameTask as FrameTask
+    from qpsafe.tasks.frame import RelativeFrameTask as RelativeFrameTask
+    from qpsafe.tasks.joint import JointTask as JointTask
+    from qpsafe.tasks.joint import PostureTask as PostureTask
     from qpsafe.tasks.orientation import OrientationTask as OrientationTask
     from qpsafe.tasks.position import PositionTask as PositionTask
+    from qpsafe.tasks.program import Program as Program
+    from qpsafe.tasks.program_file import load_program as load_program
     from qpsafe.tasks.trajectory import FixedPose as FixedPose
     from qpsafe.tick import Tick as Tick
 

@@ -54,6 +54,8 @@ class HierarchicalLaw:
             raise ConfigurationError("HierarchicalLaw", "damping", damping, f"0 with solver {solver!r}")
         self.projection = projection
         self.solver = solver
+        if solver in (None, "own"):
+            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
         self.damping = float(damping)
 
     def solve(self, problem: LawProblem) -> LawResult:

@@ -31,6 +31,8 @@ class WeightedLaw:
             raise ConfigurationError("WeightedLaw", "ratio", ratio, "a finite number > 1")
         self.ratio = ratio
         self.solver = solver
+        if solver in (None, "own"):
+            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
