@@ -11,7 +11,7 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.timing import Times, time_calls
 
 
-def time_mink(runs: int, progress: Callable[[], None] | None = None) -> Times:
+def time_mink(runs: int, progress: Callable[[int], None] | None = None) -> Times:
     """`mink.solve_ik` with daqp on the IRB 140, at a moving target; the configuration is updated in each call."""
     import mink
     import mujoco
@@ -34,7 +34,7 @@ def time_mink(runs: int, progress: Callable[[], None] | None = None) -> Times:
     return time_calls(tick, runs, progress=progress)
 
 
-def time_pink(runs: int, progress: Callable[[], None] | None = None) -> Times | None:
+def time_pink(runs: int, progress: Callable[[int], None] | None = None) -> Times | None:
     """`pink.solve_ik` with daqp on the same job; None where the extra "bench" is not installed."""
     try:
         import pink

@@ -26,10 +26,10 @@ def bench(
 
     with progress_bar(screen) as progress:
         task = progress.add_task("danger field", total=2000)
-        field = time_danger_field(2000, lambda: progress.advance(task))
+        field = time_danger_field(2000, partial(progress.advance, task))
         rows = {"danger field, 20 points x 6 links": field}
         task = progress.add_task("sensing", total=5000)
-        sensing = time_sensing(5000, lambda: progress.advance(task))
+        sensing = time_sensing(5000, partial(progress.advance, task))
         rows["sensing, 20 spots, all filters"] = sensing
         for name, law in _laws().items():
             task = progress.add_task(f"tick, {name}", total=ticks)
