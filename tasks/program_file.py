@@ -12,26 +12,32 @@ left = { position = [0.45, 0.2, 0.5], euler = [180.0, 80.0, 180.0] }   # m; deg 
 right = { position = [0.45, -0.2, 0.5] }                               # oriented as at the start
 rest = { joints = [0.0, -5.0, 0.0, 0.0, 85.0, 0.0] }                   # deg
 
+[vary]                            # the segments run once with each of these, one after the other
+part = ["left", "right"]
+
 [[segment]]
 do = "line"                       # line, arc, joint, dwell or event
-to = "right"
+to = "part"
+above = 0.1                       # m; 0 by default
 """
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.lines import line_of
 from qpsafe.tasks.moves import Arc, Dwell, JointMove, JointMoveOfFrame, Line, Move
 from qpsafe.tasks.program import Program
+from qpsafe.tasks.program_tables import ArcSegment, DwellSegment, EventSegment, JointSegment, Point, ProgramFile
 from qpsafe.tasks.reach import UnreachableError, follow, joints_for
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.timing import Rates
@@ -40,75 +46,10 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
-_Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
-_Vector = tuple[_Finite, _Finite, _Finite]
-_Name = Annotated[str, Field(strict=True, min_length=1)]
 
 
 class ProgramError(ConfigurationError):
     """A program file is wrong; `where` holds file and line."""
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Rates(_Table):
-    speed: _Positive = 0.25
-    acceleration: _Positive = 1.0
-    jerk: _Positive = 10.0
-    angular_speed: _Positive = 45.0
-    angular_acceleration: _Positive = 180.0
-    angular_jerk: _Positive = 1800.0
-    joints: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.3  # share of the robot's own limits
-
-
-class _Point(_Table):
-    position: _Vector | None = None
-    euler: _Vector | None = None
-    joints: list[_Finite] | None = None
-
-
-class _Line(_Table):
-    do: Literal["line"]
-    to: _Name
-    speed: _Positive | None = None
-
-
-class _Arc(_Table):
-    do: Literal["arc"]
-    via: _Name
-    to: _Name
-    speed: _Positive | None = None
-
-
-class _Joint(_Table):
-    do: Literal["joint"]
-    to: _Name
-
-
-class _Dwell(_Table):
-    do: Literal["dwell"]
-    time: _Positive
-
-
-class _Event(_Table):
-    do: Literal["event"]
-    name: _Name
-    dwell: Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)] = 0.0
-
-
-_Segment = Annotated[_Line | _Arc | _Joint | _Dwell | _Event, Field(discriminator="do")]
-
-
-class _File(_Table):
-    frame: _Name = "tcp"
-    cycle: Annotated[bool, Field(strict=True)] = False
-    start: _Name | None = None
-    rates: _Rates = _Rates()
-    points: dict[str, _Point] = {}
-    segment: Annotated[list[_Segment], Field(min_length=1)]
 
 
 def load_program(path: str | Path, robot: Robot) -> Program:
@@ -135,7 +76,7 @@ def load_program(path: str | Path, robot: Robot) -> Program:
         line = found.group(1) if found else str(len(text.splitlines()))
         raise ProgramError(f"{path}:{line}", "file", str(problem), "well-formed TOML") from None
     try:
-        file = _File.model_validate(table)
+        file = ProgramFile.model_validate(table)
     except ValidationError as problem:
         first = problem.errors()[0]
         keys = [key for key in first["loc"] if not (isinstance(key, str) and key in _KINDS)]
@@ -151,7 +92,7 @@ _KINDS = ("line", "arc", "joint", "dwell", "event")
 class _Builder:
     """Turns a checked file into moves, following them with the robot's joints."""
 
-    def __init__(self, path: Path, text: str, file: _File, robot: Robot) -> None:
+    def __init__(self, path: Path, text: str, file: ProgramFile, robot: Robot) -> None:
         self.path, self.text, self.file, self.robot = path, text, file, robot
         if file.frame not in robot.frame_names:
             raise self.wrong(["frame"], file.frame, "one of " + ", ".join(robot.frame_names))
@@ -163,6 +104,13 @@ class _Builder:
                 good = q.shape == (robot.nq,) and (q >= robot.lower).all() and (q <= robot.upper).all()
                 if not good:
                     raise self.wrong(["points", name, "joints"], point.joints, f"{robot.nq} angles inside the limits")
+        self.round = 0  # of the segments, counted through what varies
+        for name, choices in file.vary.items():
+            if name in file.points:
+                raise self.wrong(["vary", name], name, "a name that no point has")
+            for choice in choices:
+                if choice not in file.points:
+                    raise self.wrong(["vary", name], choice, "points, of " + ", ".join(file.points))
         self.q: Array = robot.home
         self.first: Array = robot.pose(file.frame, self.q)  # gives the orientation of points without one
         if file.start is not None:
@@ -172,13 +120,15 @@ class _Builder:
     def program(self) -> Program:
         moves: list[Move] = []
         events: list[tuple[int, str]] = []
-        for k, segment in enumerate(self.file.segment):
-            if isinstance(segment, _Event):
-                events.append((len(moves), segment.name))
-                if segment.dwell > 0.0:
-                    moves.append(Dwell(self.pose, segment.dwell))
-            else:
-                moves.append(self.move(k, segment))
+        for number in range(math.lcm(*(len(choices) for choices in self.file.vary.values()))):
+            self.round = number
+            for k, segment in enumerate(self.file.segment):
+                if isinstance(segment, EventSegment):
+                    events.append((len(moves), segment.name))
+                    if segment.dwell > 0.0:
+                        moves.append(Dwell(self.pose, segment.dwell))
+                else:
+                    moves.append(self.move(k, segment))
         if not moves:
             raise self.wrong(["segment"], "only events", "at least one move or dwell")
         try:
@@ -191,12 +141,12 @@ class _Builder:
         return self.robot.pose(self.file.frame, self.q)
 
     def move(self, k: int, segment: Any) -> Move:
-        if isinstance(segment, _Dwell):
+        if isinstance(segment, DwellSegment):
             return Dwell(self.pose, segment.time)
         key, robot, frame = ["segment", k, "to"], self.robot, self.file.frame
         move: Move
         try:
-            if isinstance(segment, _Joint):
+            if isinstance(segment, JointSegment):
                 goal = self.joints(key, segment.to)
                 share = self.file.rates.joints
                 speed, acceleration = share * robot.max_velocity, share * robot.max_acceleration
@@ -204,14 +154,14 @@ class _Builder:
                 self.q = goal
                 return JointMoveOfFrame(robot, frame, joints)
             linear, angular = self.rates(segment.speed)
-            if isinstance(segment, _Arc):
+            if isinstance(segment, ArcSegment):
                 via = self.target(["segment", k, "via"], segment.via)[:3, 3]
-                move = Arc(self.pose, via, self.target(key, segment.to), linear, angular)
+                move = Arc(self.pose, via, self.target(key, segment.to, segment.above), linear, angular)
             else:
-                move = Line(self.pose, self.target(key, segment.to), linear, angular)
+                move = Line(self.pose, self.target(key, segment.to, segment.above), linear, angular)
             self.q = follow(robot, frame, move, self.q)
         except UnreachableError as problem:
-            raise self.wrong(key, segment.to, f"a goal that can be reached so: {problem}") from None
+            raise self.wrong(key, self.chosen(segment.to), f"a goal that can be reached so: {problem}") from None
         except ProgramError:
             raise
         except ConfigurationError as problem:
@@ -224,16 +174,27 @@ class _Builder:
         turning = np.deg2rad((r.angular_speed, r.angular_acceleration, r.angular_jerk)).tolist()
         return Rates(speed or r.speed, r.acceleration, r.jerk), Rates(*turning)
 
-    def point(self, keys: list, name: str) -> _Point:
+    def chosen(self, name: str) -> str:
+        """The point a name stands for in this round."""
+        choices = self.file.vary.get(name)
+        return name if choices is None else choices[self.round % len(choices)]
+
+    def point(self, keys: list, name: str) -> Point:
+        name = self.chosen(name)
         if name not in self.file.points:
-            raise self.wrong(keys, name, "one of the points " + ", ".join(self.file.points))
+            raise self.wrong(keys, name, "one of the points " + ", ".join((*self.file.points, *self.file.vary)))
         return self.file.points[name]
 
-    def target(self, keys: list, name: str) -> Array:
-        """Pose of a point (4, 4)."""
+    def target(self, keys: list, name: str, above: float = 0.0) -> Array:
+        """Pose of a point, or that far above it (4, 4)."""
+        pose = self.pose_of(keys, name)
+        pose[2, 3] += above
+        return pose
+
+    def pose_of(self, keys: list, name: str) -> Array:
         point = self.point(keys, name)
         if point.joints is not None:
-            return self.robot.pose(self.file.frame, np.deg2rad(point.joints))
+            return self.robot.pose(self.file.frame, np.deg2rad(point.joints)).copy()
         pose = self.first.copy()
         pose[:3, 3] = point.position
         if point.euler is not None:

@@ -158,6 +158,71 @@ def test_malformed_files_are_refused_with_the_line(tmp_path: Path) -> None:
         load_program(write(tmp_path, '[[segment]]\ndo = "event"\nname = "grip"\n'), robot)
 
 
+VARIED = """cycle = true
+start = "box"
+
+[points]
+a = { position = [0.45, 0.20, 0.4] }
+b = { position = [0.45, 0.25, 0.4] }
+c = { position = [0.50, 0.20, 0.4] }
+box = { position = [0.45, -0.2, 0.5] }
+
+[vary]
+hole = ["a", "b", "c"]
+
+[[segment]]
+do = "line"
+to = "hole"
+above = 0.1
+
+[[segment]]
+do = "line"
+to = "hole"
+
+[[segment]]
+do = "event"
+name = "grip"
+
+[[segment]]
+do = "line"
+to = "box"
+"""
+
+
+def test_points_that_vary_take_turns(tmp_path: Path) -> None:
+    """The program with a list of points is the one with its segments written out for each of them."""
+    program = load_program(write(tmp_path, VARIED), robot)
+    head, body = VARIED.split("[vary]")
+    segments = "[[segment]]" + body.partition("[[segment]]")[2]
+    written_out = head + "".join(segments.replace('"hole"', f'"{name}"') for name in "abc")
+    other = load_program(write(tmp_path, written_out), robot)
+    assert program.duration == other.duration
+    assert program.events == other.events
+    for t in np.linspace(0.0, 2.0 * program.duration, 200):
+        assert (program.sample(t).pose == other.sample(t).pose).all()
+    grips = [program.sample(program.event(k).time).pose[:3, 3] for k in range(4)]  # type: ignore[union-attr]
+    assert np.allclose(grips, [[0.45, 0.2, 0.4], [0.45, 0.25, 0.4], [0.5, 0.2, 0.4], [0.45, 0.2, 0.4]], atol=1e-7)
+    assert program.moves[0].sample(9.0).pose[2, 3] == pytest.approx(0.5, abs=1e-7)  # above the first
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "key", "said"),
+    [
+        ('"c"]', '"d"]', 11, "vary.hole", "'d'"),
+        ('hole = ["a"', 'box = ["a"', 11, "vary.box", "no point"),
+        ('["a", "b", "c"]', "[]", 11, "vary.hole", "at least 1"),
+        ("[0.50, 0.20, 0.4]", "[1.50, 0.20, 0.4]", 15, "segment[0].to", "'c'"),  # says which of them
+        ("above = 0.1", "above = nan", 16, "segment[0].above", "finite"),
+    ],
+)
+def test_mistakes_in_points_that_vary(tmp_path: Path, old: str, new: str, line: int, key: str, said: str) -> None:
+    path = write(tmp_path, VARIED.replace(old, new, 1))
+    with pytest.raises(ProgramError) as caught:
+        load_program(path, robot)
+    assert (caught.value.where, caught.value.key) == (f"{path}:{line}", key)
+    assert said in str(caught.value)
+
+
 def test_too_fast_for_a_joint_is_refused_by_its_name(tmp_path: Path) -> None:
     text = GOOD.replace("speed = 0.05", "speed = 40.0").replace(
         "speed = 0.2", "speed = 40.0\nacceleration = 1e4\njerk = 1e7"
