@@ -37,6 +37,8 @@ _PUBLIC = {
     "SafetyController": "qpsafe.controller",
     "SensingRules": "qpsafe.sensing.rules",
     "SpotArray": "qpsafe.sensing.spots",
+    "StopCategory": "qpsafe.supervisor",
+    "Supervisor": "qpsafe.supervisor",
     "Threshold": "qpsafe.danger.activation",
     "Tick": "qpsafe.tick",
     "WeightedLaw": "qpsafe.laws.weighted",
@@ -79,6 +81,8 @@ if TYPE_CHECKING:
     from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
     from qpsafe.sensing.spots import load_spots as load_spots
+    from qpsafe.supervisor import StopCategory as StopCategory
+    from qpsafe.supervisor import Supervisor as Supervisor
     from qpsafe.tasks.frame import FrameTask as FrameTask
     from qpsafe.tasks.frame import RelativeFrameTask as RelativeFrameTask
     from qpsafe.tasks.joint import JointTask as JointTask

@@ -1,0 +1,163 @@
+"""The supervisor only escalates until acknowledged, and says why; its diagram in the docs is its table."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from qpsafe.supervisor import TRANSITIONS, Event, State, StopCategory, Supervisor
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "supervisor.md"
+CAUSES = st.sampled_from(["sensor 3", "robot: motors off", "watchdog", "no packet", "operator"])
+CATEGORIES = st.sampled_from(StopCategory)
+
+
+class Stream(RuleBasedStateMachine):
+    """Any sequence of events."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 0.0
+        self.heard: list = []
+        self.supervisor = Supervisor(lambda: self.now, on_transition=self.heard.append)
+        self.worst = self.supervisor.state
+        self.gravest: StopCategory | None = None
+
+    @rule(cause=CAUSES)
+    def seed(self, cause: str) -> None:
+        self.check(Event.SEED, self.supervisor.seed(cause), cause)
+
+    @rule(cause=CAUSES)
+    def run(self, cause: str) -> None:
+        self.check(Event.RUN, self.supervisor.run(cause), cause)
+
+    @rule(cause=CAUSES)
+    def degrade(self, cause: str) -> None:
+        self.check(Event.DEGRADE, self.supervisor.degrade(cause), cause)
+
+    @rule(category=CATEGORIES, cause=CAUSES)
+    def stop(self, category: StopCategory, cause: str) -> None:
+        asked = self.supervisor.stop(category, cause)
+        self.check(Event.CUT if category == 0 else Event.STOP, asked, cause)
+        # whatever the state was: from now on the robot stops, at least as gravely as asked, and the cause is kept
+        assert self.supervisor.state in (State.STOPPING, State.STOPPED)
+        assert self.supervisor.category is not None
+        assert self.supervisor.category <= category
+        assert cause in self.supervisor.causes
+
+    @rule(cause=CAUSES)
+    def standstill(self, cause: str) -> None:
+        self.check(Event.STANDSTILL, self.supervisor.standstill(cause), cause)
+
+    @rule(cause=CAUSES)
+    def acknowledge(self, cause: str) -> None:
+        before = self.supervisor.state
+        done = self.supervisor.acknowledge(cause)
+        assert done == (before in (State.DEGRADED, State.STOPPED))
+        if done:  # never to more than what it was before the trouble
+            assert self.supervisor.state == {State.DEGRADED: State.RUNNING, State.STOPPED: State.IDLE}[before]
+            assert self.supervisor.causes == ()
+            assert self.supervisor.category is None
+            self.worst, self.gravest = self.supervisor.state, None
+        else:
+            assert self.supervisor.state is before
+
+    @rule(step=st.floats(0.0, 10.0))
+    def wait(self, step: float) -> None:
+        self.now += step
+
+    def check(self, event: Event, changed: bool, cause: str) -> None:
+        """A reported change is on the log with its cause, time and event; without one nothing changed."""
+        if changed:
+            last = self.supervisor.log[-1]
+            assert (last.after, last.event, last.cause) == (self.supervisor.state, event, cause)
+            assert last.time == self.now
+
+    @invariant()
+    def only_escalates(self) -> None:
+        state, category = self.supervisor.state, self.supervisor.category
+        assert state.severity >= self.worst.severity
+        assert self.gravest is None or (category is not None and category <= self.gravest)
+        self.worst, self.gravest = state, category
+
+    @invariant()
+    def what_is_wrong_has_a_cause(self) -> None:
+        bad = self.supervisor.state.severity >= State.DEGRADED.severity
+        assert bool(self.supervisor.causes) == bad
+        assert (self.supervisor.category is not None) == (self.supervisor.state in (State.STOPPING, State.STOPPED))
+
+    @invariant()
+    def the_log_is_a_chain(self) -> None:
+        log = list(self.supervisor.log)
+        assert log == self.heard
+        assert self.supervisor.count == len(log)
+        state = State.IDLE
+        for transition in log:
+            assert transition.before is state
+            assert transition.cause
+            assert transition.after is TRANSITIONS.get((state, transition.event), state)
+            state = transition.after
+        assert state is self.supervisor.state
+
+    @precondition(lambda self: self.supervisor.silent)
+    @invariant()
+    def silence_is_not_broken_but_by_acknowledgement(self) -> None:
+        for again in (self.supervisor.seed, self.supervisor.run):
+            assert not again("by itself")
+        assert self.supervisor.silent
+        assert not self.supervisor.moving
+
+
+TestStream = Stream.TestCase
+TestStream.settings = settings(max_examples=120, stateful_step_count=30, deadline=None)
+
+
+def test_no_event_but_acknowledgement_leads_back() -> None:
+    for (before, event), after in TRANSITIONS.items():
+        if event is not Event.ACKNOWLEDGE:
+            assert after.severity > before.severity
+    assert [state.value for state in State] == ["idle", "seeding", "running", "degraded", "stopping", "stopped"]
+
+
+def test_every_state_can_be_stopped_and_every_category_has_a_name() -> None:
+    for state in (State.IDLE, State.SEEDING, State.RUNNING, State.DEGRADED):
+        assert {(state, Event.STOP), (state, Event.CUT)} <= set(TRANSITIONS)
+    assert {c.value: c.name for c in StopCategory} == {
+        0: "IMMEDIATE",
+        1: "CONTROLLED_THEN_SILENT",
+        2: "CONTROLLED_AND_HELD",
+    }
+
+
+def test_the_log_is_bounded_and_a_repeated_cause_is_logged_once() -> None:
+    supervisor = Supervisor(keep=5)
+    supervisor.seed("ready")
+    supervisor.run("ramped in")
+    for _ in range(1000):
+        supervisor.degrade("sensor 3 is sick")
+    assert supervisor.count == 3
+    for k in range(1000):
+        supervisor.degrade(f"cause {k}")
+    assert len(supervisor.log) == 5
+    assert len(supervisor.causes) <= 100
+    text = str(supervisor.log[-1])
+    assert "degraded -> degraded" in text
+    assert "cause" in text
+
+
+def test_a_wrong_category_is_refused() -> None:
+    with pytest.raises(ValueError, match="3"):
+        Supervisor().stop(3, "no such category")  # type: ignore[arg-type]
+
+
+def test_the_diagram_is_the_table() -> None:
+    """States and edges of the page's mermaid diagram are those of the code."""
+    (block,) = re.findall(r"^```mermaid\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    drawn = re.findall(r"^\s*(\w+) --> (\w+): (.+)$", block, re.MULTILINE)
+    edges = [(a, word.strip(), b) for a, b, words in drawn for word in words.split(",")]
+    assert len(edges) == len(set(edges))
+    assert set(edges) == {(a.value, event.value, b.value) for (a, event), b in TRANSITIONS.items()}
+    assert f"[*] --> {Supervisor().state}" in block
