@@ -24,6 +24,7 @@ from hqp_family import KINDS, Hierarchy, drift, family
 from qpsafe.hqp.cascade import solve_cascade
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.native_daqp import arrange, call_daqp
+from qpsafe.hqp.native_proxqp import solve_proxqp
 from qpsafe.hqp.solve import solve_hierarchy
 
 Solver = Callable[[], np.ndarray | None]
@@ -78,6 +79,17 @@ def native(case: Case) -> Solver:
     return lambda: call_daqp(arranged, p.lower, p.upper)[0]
 
 
+def proxqp(case: Case) -> Solver:
+    """PROXQP level by level in kept workspaces, warm started."""
+    levels, p = stacked(case), case.problem
+
+    def call() -> np.ndarray | None:
+        qd, _, failures = solve_proxqp(levels, p.lower, p.upper)
+        return None if failures else qd
+
+    return call
+
+
 def weighted(case: Case) -> Solver:
     """One program, every level 1000 times the weight of the next: 1e6 : 1e3 : 1 for three."""
     import daqp
@@ -118,11 +130,12 @@ def weighted(case: Case) -> Solver:
 SOLVERS: dict[str, Callable[[Case], Solver]] = {
     "own": own,
     "DAQP, its hierarchical mode": native,
+    "PROXQP, kept workspaces": proxqp,
     "DAQP cascade (qpsolvers)": cascade("daqp"),
     "PROXQP cascade (qpsolvers)": cascade("proxqp"),
     "one weighted QP (DAQP)": weighted,
 }
-SLOW = {"DAQP cascade (qpsolvers)", "PROXQP cascade (qpsolvers)"}
+SLOW = {"PROXQP, kept workspaces", "DAQP cascade (qpsolvers)", "PROXQP cascade (qpsolvers)"}
 
 
 def prepare(problem: Hierarchy) -> Case:

@@ -47,9 +47,9 @@ def solve_hierarchy(
         levels: `(A, b)` pairs or `Level`s, highest priority first; A is (rows, n).
         lower: (n,) hard lower limits [rad/s], may be infinite; None means none.
         upper: (n,) hard upper limits [rad/s], may be infinite; None means none.
-        solver: "own" (the default), "daqp" (its hierarchical mode) or "qpsolvers:<name>" (one program a level). The own
-            solver judges these: where they fail or a level comes out worse, its answer is returned, and `solver` and
-            `note` of the solution say so.
+        solver: "own" (the default), "daqp" (its hierarchical mode), "proxqp" (level by level in workspaces that are
+            kept and warm started) or "qpsolvers:<name>" (one program a level). The own solver judges these: where they
+            fail or a level comes out worse, its answer is returned, and `solver` and `note` of the solution say so.
         rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
         damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
             A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
@@ -90,7 +90,7 @@ def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") ->
 
 def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
     """Solve with somebody else's solver; the own one judges the result, and answers where it fails."""
-    backend = _backend(solver)
+    backend = "" if solver in ("daqp", "proxqp") else _backend(solver)
     own = _own(problem, begin)
     if own.status in (INVALID_DATA, INVALID_LIMITS, FAILED):
         return own
@@ -101,6 +101,10 @@ def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
         from qpsafe.hqp.cascade import solve_cascade
 
         qd, turns, failures = solve_cascade(backend, levels, np.clip(np.zeros_like(box[0]), *box), *box)
+    elif solver == "proxqp":
+        from qpsafe.hqp.native_proxqp import solve_proxqp
+
+        qd, turns, failures = solve_proxqp(levels, *box)
     else:
         from qpsafe.hqp.native_daqp import solve_daqp
 
@@ -136,13 +140,11 @@ def _name(problem: Packed, level: int) -> str:
 
 
 def _backend(solver: str) -> str:
-    """Name of the qpsolvers back end behind "qpsolvers:<name>", empty for "daqp"."""
-    if solver == "daqp":
-        return ""
+    """Name of the qpsolvers back end behind "qpsolvers:<name>"."""
     import qpsolvers
 
     prefix, _, name = solver.partition(":") if isinstance(solver, str) else ("", "", "")
     if prefix != "qpsolvers" or name not in qpsolvers.available_solvers:
         known = ", ".join(f'"qpsolvers:{name}"' for name in qpsolvers.available_solvers)
-        raise ConfigurationError("solve_hierarchy", "solver", solver, f'"own", "daqp" or one of {known}')
+        raise ConfigurationError("solve_hierarchy", "solver", solver, f'"own", "daqp", "proxqp" or one of {known}')
     return name
