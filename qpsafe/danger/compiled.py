@@ -15,7 +15,10 @@ from qpsafe.errors import ConfigurationError
 Vector = tuple[float, float, float]
 Array = NDArray[np.float64]
 
-inline = numba.njit(error_model="numpy")  # 1/0 = inf as in C; no fastmath, NaN must come through
+# 1/0 = inf as in C; no fastmath, NaN must come through. Without reference counting (`_nrt`), whose atomic counters cost
+# more than the arithmetic here: compiled code may not allocate.
+OPTIONS = {"error_model": "numpy", "_nrt": False}
+inline = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
 
@@ -24,9 +27,9 @@ def entry(signature: Any) -> Callable[[Callable[..., None]], Callable[..., None]
 
     def compiled(function: Callable[..., None]) -> Callable[..., None]:
         try:
-            return numba.njit(signature, error_model="numpy", cache=True)(function)
+            return numba.njit(signature, cache=True, no_cfunc_wrapper=True, **OPTIONS)(function)
         except RuntimeError:  # no directory that numba may write to
-            return numba.njit(signature, error_model="numpy")(function)
+            return numba.njit(signature, no_cfunc_wrapper=True, **OPTIONS)(function)
 
     return compiled
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.spec import RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
@@ -37,8 +37,9 @@ class Robot:
         wire_frames: Start and end frame of each segment of the wire model.
         wire_end_frames: The different frames in `wire_frames`, base to tip.
         wire_indices: Places of the segments' start and end frames in `wire_end_frames`, two (links,) arrays.
-        wire_end_ids: pinocchio's indices of `wire_end_frames`.
-        wire_support: 1 where a joint moves a frame of `wire_end_frames`, else 0, (k, 1, n).
+        ends: How many these are, k.
+        tree: The joints as compiled code sees them, taken from the model.
+        memory: Floats in the kinematics of one configuration.
         tool: The mounted tool, or None.
         dh: Standard Denavit-Hartenberg table (theta, d, a, alpha), (n, 4), or None.
         dh_frames: Names of the frames of that table.
@@ -72,12 +73,13 @@ class Robot:
         starts = np.array([place[start] for start, _ in spec.wire_frames], dtype=np.intp)
         stops = np.array([place[stop] for _, stop in spec.wire_frames], dtype=np.intp)
         self.wire_indices = (starts, stops)
-        self.wire_end_ids = tuple(self._frame_ids[name] for name in self.wire_end_frames)
-        self.wire_support = np.zeros((len(self.wire_end_ids), 1, self.nq))
-        for row, index in enumerate(self.wire_end_ids):
-            for joint in list(model.supports[model.frames[index].parentJoint])[1:]:  # 0 is the universe
-                self.wire_support[row, 0, joint - 1] = 1.0
-        self._pool: list[Any] = []
+        self.ends = len(self.wire_end_frames)
+        self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
+        self.memory = self.tree.memory
+        frames = {name: model.frames[index] for name, index in self._frame_ids.items()}
+        self._mountings = {
+            name: (int(frame.parentJoint), _read_only(frame.placement.homogeneous)) for name, frame in frames.items()
+        }
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
@@ -121,8 +123,18 @@ class Robot:
         try:
             return self._frame_ids[frame]
         except (KeyError, TypeError):
-            expected = "one of " + ", ".join(self.frame_names)
-            raise ConfigurationError(f"robot {self.name}", "frame", frame, expected) from None
+            raise self._no_frame(frame) from None
+
+    def mounting(self, frame: str) -> tuple[int, NDArray[np.float64]]:
+        """The body a frame sits on, numbered as in `RobotState.body_poses`, and its pose on that body (4, 4) [m].
+
+        Raises:
+            ConfigurationError: There is no such frame; the message lists those there are.
+        """
+        try:
+            return self._mountings[frame]
+        except (KeyError, TypeError):
+            raise self._no_frame(frame) from None
 
     def joint_vector(self, values: ArrayLike, key: str) -> NDArray[np.float64]:
         """A float64 array of one value a joint, (n,).
@@ -138,15 +150,8 @@ class Robot:
             raise ConfigurationError(f"robot {self.name}", key, values, f"{self.nq} numbers, one a joint")
         return array
 
-    def _borrow(self) -> Any:
-        """A pinocchio work space that no live state uses."""
-        try:
-            return self._pool.pop()
-        except IndexError:
-            return pin.Data(self.model)
-
-    def _give_back(self, data: Any) -> None:
-        self._pool.append(data)
+    def _no_frame(self, frame: object) -> ConfigurationError:
+        return ConfigurationError(f"robot {self.name}", "frame", frame, "one of " + ", ".join(self.frame_names))
 
 
 def _read_only(values: ArrayLike) -> NDArray[np.float64]:

@@ -2,68 +2,64 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
-from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import entry, readable
+from qpsafe.robot.kinematics import forward, jacobian_of, pose_of, wire_of
 from qpsafe.robot.wire import Wire
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
+Array = NDArray[np.float64]
+
 
 class RobotState:
     """Kinematics of a robot at one configuration; made by [`Robot.at`][qpsafe.robot.robot.Robot.at].
 
-    Several states may be alive at the same time (measured and commanded pose): each owns its work space, and gives it
-    back to the robot when it is no longer referred to. Every array returned is the caller's own.
+    Several states may be alive at the same time (measured and commanded pose): each owns its memory. Every array
+    returned is the caller's own, or read-only.
 
     Attributes:
         robot: The robot.
         q: The configuration, (n,) [rad], read-only.
+        memory: What `qpsafe.robot.kinematics.forward` computed, for compiled code.
     """
 
-    __slots__ = ("_data", "_ends", "_jacobians", "_placements", "q", "robot")
+    __slots__ = ("memory", "q", "robot")
 
-    def __init__(self, robot: Robot, q: NDArray[np.float64]) -> None:
+    def __init__(self, robot: Robot, q: Array) -> None:
         self.robot = robot
         self.q = q
-        self._data: Any = robot._borrow()
-        self._ends: NDArray[np.float64] | None = None
-        self._jacobians: NDArray[np.float64] | None = None
-        pin.computeJointJacobians(robot.model, self._data, q)  # forward kinematics included
-        pin.updateFramePlacements(robot.model, self._data)
-        self._placements = self._data.oMf
+        self.memory = np.empty(robot.memory)
+        forward(q, *robot.tree, self.memory)
 
-    def __del__(self) -> None:
-        data = getattr(self, "_data", None)
-        if data is not None:
-            self.robot._give_back(data)
-
-    def body_poses(self) -> NDArray[np.float64]:
+    def body_poses(self) -> Array:
         """Poses in the world of all moving bodies, body i moved by joint i (from 1); 0 is the world, (n + 1, 4, 4)."""
-        return np.array([placement.homogeneous for placement in self._data.oMi])
+        n = self.robot.nq
+        return self.memory[: 16 * (n + 1)].reshape(n + 1, 4, 4).copy()
 
-    def pose(self, frame: str) -> NDArray[np.float64]:
+    def pose(self, frame: str) -> Array:
         """Pose of a frame in the world, (4, 4) [m]."""
-        return self._placements[self.robot.frame_id(frame)].homogeneous
+        robot, pose = self.robot, np.empty((4, 4))
+        pose_of(self.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), pose)
+        return pose
 
-    def position(self, frame: str) -> NDArray[np.float64]:
+    def position(self, frame: str) -> Array:
         """Origin of a frame in the world, (3,) [m]."""
         return self.pose(frame)[:3, 3]
 
-    def rotation(self, frame: str) -> NDArray[np.float64]:
+    def rotation(self, frame: str) -> Array:
         """Axes of a frame in the world, in columns, (3, 3)."""
         return self.pose(frame)[:3, :3]
 
-    def jacobian(self, frame: str) -> NDArray[np.float64]:
+    def jacobian(self, frame: str) -> Array:
         """Geometric Jacobian of a frame, world axes, three linear rows before three angular ones, (6, n)."""
-        index = self.robot.frame_id(frame)
-        return pin.getFrameJacobian(self.robot.model, self._data, index, pin.LOCAL_WORLD_ALIGNED)
+        robot, J = self.robot, np.empty((6, self.robot.nq))
+        jacobian_of(self.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), J)
+        return J
 
     def wire(self, qd: ArrayLike) -> Wire:
         """Segments of the wire model and the velocities of their ends at joint velocities qd, eq. (4).
@@ -77,60 +73,19 @@ class RobotState:
         Raises:
             ConfigurationError: qd has the wrong shape.
         """
-        qd = self.robot.joint_vector(qd, "qd")
-        ends, jacobians = self._wire_ends(), self.wire_jacobians()
-        starts, stops = self.robot.wire_indices
+        robot = self.robot
+        starts, stops = robot.wire_indices
         parts = np.empty((4, len(starts), 3))
-        _segments(ends, jacobians, qd, starts, stops, parts)
+        wire_of(self.memory, robot.ends, robot.joint_vector(qd, "qd"), starts, stops, parts)
         return Wire(*parts)
 
-    def wire_jacobians(self) -> NDArray[np.float64]:
+    def wire_jacobians(self) -> Array:
         """Linear Jacobians of the frames that end segments of the wire, (k, 3, n), as in `robot.wire_end_frames`.
 
         Eq. (14) needs them at both ends of each link: rows ``robot.wire_indices[0]`` and ``[1]`` of this array.
-        Computed once a state and read-only.
+        Read-only.
         """
-        if self._jacobians is None:
-            ends = self._wire_ends()
-            jacobians = np.empty((len(ends), 3, self.robot.nq))
-            _point_jacobians(self._data.J, ends, self.robot.wire_support, jacobians)
-            jacobians.flags.writeable = False
-            self._jacobians = jacobians
-        return self._jacobians
-
-    def _wire_ends(self) -> NDArray[np.float64]:
-        if self._ends is None:
-            self._ends = np.array([self._placements[index].homogeneous[:3, 3] for index in self.robot.wire_end_ids])
-        return self._ends
-
-
-_places = types.Array(types.int64, 1, "A", readonly=True)
-
-
-@entry(types.void(readable(2), readable(2), readable(3), types.float64[:, :, ::1]))
-def _point_jacobians(J, points, support, result):  # type: ignore[no-untyped-def]
-    """Linear Jacobians of points (k, 3) from the joint axes' twists (v, ω) at the world's origin, J (6, n).
-
-    Joint j moves the point p by v + ω × p if it moves the point at all, support (k, 1, n).
-    """
-    for k in range(points.shape[0]):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
-        for j in range(J.shape[1]):
-            on = support[k, 0, j]
-            result[k, 0, j] = on * (J[0, j] + J[4, j] * z - J[5, j] * y)
-            result[k, 1, j] = on * (J[1, j] + J[5, j] * x - J[3, j] * z)
-            result[k, 2, j] = on * (J[2, j] + J[3, j] * y - J[4, j] * x)
-
-
-@entry(types.void(readable(2), readable(3), readable(1), _places, _places, types.float64[:, :, ::1]))
-def _segments(ends, jacobians, qd, starts, stops, parts):  # type: ignore[no-untyped-def]
-    """Fill parts (4, links, 3): starts, ends, start velocities, end velocities; v = J q̇."""
-    for side in range(2):
-        places = starts if side == 0 else stops
-        for i in range(len(places)):
-            for c in range(3):
-                velocity = 0.0
-                for j in range(len(qd)):
-                    velocity += jacobians[places[i], c, j] * qd[j]
-                parts[side, i, c] = ends[places[i], c]
-                parts[2 + side, i, c] = velocity
+        n, k = self.robot.nq, self.robot.ends
+        jacobians = self.memory[-3 * k * n :].reshape(k, 3, n)
+        jacobians.flags.writeable = False
+        return jacobians

@@ -125,7 +125,7 @@ def _hold(
         if known and (d <= seen[i] + jump or age[i] >= limit):
             age[i] = 0
             seen[i] = d if counts[i] else np.inf
-            held[i] = points[i]
+            held[i, 0], held[i, 1], held[i, 2] = row(points, i)
             continue
         if age[i] >= limit:  # sick for too long: forgotten, but never called free (the spot is dead by now)
             seen[i] = np.inf
