@@ -1,0 +1,201 @@
+"""Distances over UDP: one datagram per sampling of all spots, from whatever reads the sensors to the loop.
+
+Little-endian, 24 + 8 k bytes, or 24 + 16 k with ages (docs/stream.md has the same table):
+
+    offset  type         what
+    0       4 bytes      "QPSD"
+    4       uint8        version, 1
+    5       uint8        flags; 1: ages follow the distances
+    6       uint16       k, number of spots
+    8       uint32       sequence number, wraps around
+    12      uint32       0
+    16      uint64       sender's time [µs], for logs
+    24      k float64    distances in the order of spots.toml [m]; +inf: nothing in sight, NaN: no reading (REP 117)
+    ...     k float64    how old each reading was when it was sent [s], with flag 1
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+
+Array = NDArray[np.float64]
+
+DEFAULT_PORT = 6511
+_HEAD = struct.Struct("<4sBBHIIQ")
+_MAGIC, _VERSION, _AGES = b"QPSD", 1, 1
+
+
+class Distances(NamedTuple):
+    """One sampling.
+
+    Attributes:
+        seq: Sequence number, modulo 2^32.
+        time: Sender's time [s].
+        values: (k,) [m].
+        ages: (k,) [s] when sent, or None.
+    """
+
+    seq: int
+    time: float
+    values: Array
+    ages: Array | None = None
+
+
+def encode(distances: Distances) -> bytes:
+    """As a datagram."""
+    ages = distances.ages
+    head = _HEAD.pack(
+        _MAGIC,
+        _VERSION,
+        0 if ages is None else _AGES,
+        len(distances.values),
+        distances.seq % 2**32,
+        0,
+        round(1e6 * distances.time) % 2**64,
+    )
+    body = np.asarray(distances.values, dtype="<f8").tobytes()
+    return head + body + (b"" if ages is None else np.asarray(ages, dtype="<f8").tobytes())
+
+
+def decode(data: bytes, count: int) -> Distances | None:
+    """Read a datagram for `count` spots; None if it is none. Values are not judged here: the sensing does that."""
+    if len(data) < _HEAD.size:
+        return None
+    magic, version, flags, k, seq, zero, micros = _HEAD.unpack_from(data)
+    if magic != _MAGIC or version != _VERSION or flags & ~_AGES or zero != 0 or k != count:
+        return None
+    rows = 2 if flags & _AGES else 1
+    if len(data) != _HEAD.size + 8 * rows * k:
+        return None
+    numbers = np.frombuffer(data, dtype="<f8", offset=_HEAD.size).astype(np.float64).reshape(rows, k)
+    return Distances(seq, 1e-6 * micros, numbers[0], numbers[1] if rows == 2 else None)
+
+
+@dataclass
+class SensorCounts:
+    """What came in.
+
+    Attributes:
+        used: Samplings that were read.
+        skipped: Samplings that a newer one had overtaken when the loop looked.
+        stale: Duplicates, and samplings that arrived after a newer one.
+        rejected: Datagrams that are no sampling for these spots.
+        strangers: Datagrams from another sender than the first.
+    """
+
+    used: int = 0
+    skipped: int = 0
+    stale: int = 0
+    rejected: int = 0
+    strangers: int = 0
+
+
+class SensorInput:
+    """Where the loop gets its distances from: never waits, never raises on what arrives.
+
+    Args:
+        count: Number of spots.
+        host: Address of the interface to listen at; loopback by default.
+        port: 0 lets the system choose one.
+        peer: Host that may send; by default the first that sends a sampling.
+
+    Raises:
+        ConfigurationError: The address cannot be had.
+    """
+
+    RESTART_AFTER = 1.0  # after this silence, another port or a lower sequence number is a restarted sender [s]
+
+    def __init__(self, count: int, host: str = "127.0.0.1", port: int = DEFAULT_PORT, peer: str | None = None) -> None:
+        self.count, self.counts = count, SensorCounts()
+        self._host, self._port = peer, 0
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((host, port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise ConfigurationError("SensorInput", "address", f"{host}:{port}", f"a free address ({error})") from None
+        self._socket.setblocking(False)
+        self._newest: Distances | None = None
+        self._arrived = -np.inf
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where it listens."""
+        host, port = self._socket.getsockname()
+        return host, port
+
+    def close(self) -> None:
+        """Give the address back."""
+        self._socket.close()
+
+    def read(self, now: float | None = None) -> tuple[Array, Array]:
+        """The newest sampling: distances (k,) [m] and how old each is (k,) [s]; before the first, NaN and infinite."""
+        now = time.monotonic() if now is None else now
+        fresh = 0
+        for _ in range(1000):  # a flood must not hold the loop
+            try:
+                data, sender = self._socket.recvfrom(65536)
+            except BlockingIOError:
+                break
+            except OSError:  # e.g. an ICMP error that a datagram of ours has caused
+                continue
+            fresh += self._take(data, sender, now)
+        if fresh:
+            self.counts.used += 1
+            self.counts.skipped += fresh - 1
+        newest = self._newest
+        if newest is None:
+            return np.full(self.count, np.nan), np.full(self.count, np.inf)
+        ages = np.full(self.count, now - self._arrived)
+        return newest.values, ages if newest.ages is None else ages + newest.ages
+
+    def _take(self, data: bytes, sender: tuple[str, int], now: float) -> int:
+        restarted = now - self._arrived > self.RESTART_AFTER
+        if self._host not in (None, sender[0]) or not (restarted or self._port == sender[1]):
+            self.counts.strangers += 1
+            return 0
+        found = decode(data, self.count)
+        if found is None:
+            self.counts.rejected += 1
+            return 0
+        if self._newest is not None and not restarted and not 0 < (found.seq - self._newest.seq) % 2**32 < 2**31:
+            self.counts.stale += 1
+            return 0
+        self._host, self._port = sender  # the first one is the one
+        self._newest, self._arrived = found, now
+        return 1
+
+
+class SensorOutput:
+    """The sender's side: for simulations, and to try the loop out.
+
+    Args:
+        host: Where the loop listens.
+        port: Its port.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = DEFAULT_PORT) -> None:
+        self._address = host, port
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._seq = 0
+
+    def send(self, values: Array, ages: Array | None = None) -> None:
+        """Send one sampling; nobody listening is no error."""
+        try:
+            self._socket.sendto(encode(Distances(self._seq, time.time(), values, ages)), self._address)
+        except OSError:
+            pass
+        self._seq = (self._seq + 1) % 2**32
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()

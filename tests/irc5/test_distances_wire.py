@@ -1,0 +1,105 @@
+"""Distances over UDP: what is sent is read, junk and strangers change nothing."""
+
+import socket
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.distances import Distances, SensorInput, SensorOutput, decode, encode
+
+VALUES = st.integers(0, 30).flatmap(lambda k: arrays(np.float64, k))  # NaN and infinities too
+
+
+@given(VALUES, st.booleans(), st.integers(0, 2**32 - 1), st.floats(0.0, 1e9))
+def test_round_trip_to_the_bit(values: np.ndarray, aged: bool, seq: int, time: float) -> None:
+    sent = Distances(seq, time, values, values[::-1] if aged else None)
+    found = decode(encode(sent), len(values))
+    assert found is not None
+    assert found.seq == seq
+    assert abs(found.time - time) <= 1e-6
+    assert found.values.tobytes() == values.tobytes()
+    assert (found.ages is not None) == aged
+    assert found.ages is None or found.ages.tobytes() == values[::-1].tobytes()
+
+
+@settings(max_examples=300)
+@given(st.binary(max_size=400), st.integers(0, 300), st.integers(1, 255))
+def test_junk_is_nothing(junk: bytes, at: int, flip: int) -> None:
+    assert decode(junk, 20) is None or junk[:4] == b"QPSD"
+    good = encode(Distances(7, 0.0, np.arange(20.0)))
+    assert decode(good, 19) is None
+    assert decode(good[: at % len(good)], 20) is None
+    assert decode(good + junk, 20) is None or not junk
+    spoiled = bytearray(good)
+    spoiled[at % 8] ^= flip  # in magic, version, flags or count
+    assert decode(bytes(spoiled), 20) is None
+
+
+@pytest.fixture
+def wire():
+    """An input with its output, on a port that the system chose."""
+    entrance = SensorInput(3, port=0)
+    exit_ = SensorOutput(*entrance.address)
+    yield entrance, exit_
+    entrance.close()
+    exit_.close()
+
+
+def test_nothing_yet_is_no_reading_of_infinite_age(wire) -> None:
+    values, ages = wire[0].read()
+    assert np.isnan(values).all()
+    assert np.isinf(ages).all()
+
+
+def test_the_newest_counts_and_ages(wire) -> None:
+    entrance, exit_ = wire
+    for k in range(5):
+        exit_.send(np.full(3, float(k)))
+    values, ages = entrance.read(now=10.0)
+    assert values.tolist() == [4.0, 4.0, 4.0]
+    assert ages.tolist() == [0.0, 0.0, 0.0]
+    assert (entrance.counts.used, entrance.counts.skipped) == (1, 4)
+    values, ages = entrance.read(now=10.5)
+    assert values.tolist() == [4.0, 4.0, 4.0]
+    assert ages.tolist() == [0.5, 0.5, 0.5]
+    exit_.send(np.full(3, 5.0), ages=np.array([0.0, 0.1, np.nan]))
+    ages = entrance.read(now=10.6)[1]
+    assert ages[:2].tolist() == [0.0, 0.1]
+    assert np.isnan(ages[2])  # unknown stays unknown: the sensing takes it for stale
+
+
+def test_junk_duplicates_and_strangers_change_nothing(wire) -> None:
+    entrance, exit_ = wire
+    exit_.send(np.full(3, 1.0))
+    entrance.read(now=1.0)
+    own, stranger = exit_._socket, socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    own.sendto(encode(Distances(0, 0.0, np.full(3, 9.0))), entrance.address)  # a duplicate
+    own.sendto(encode(Distances(2**32 - 1, 0.0, np.full(3, 9.0))), entrance.address)  # older
+    own.sendto(b"", entrance.address)
+    own.sendto(encode(Distances(5, 0.0, np.full(4, 9.0))), entrance.address)
+    stranger.sendto(encode(Distances(5, 0.0, np.full(3, 9.0))), entrance.address)
+    values, ages = entrance.read(now=1.5)
+    assert values.tolist() == [1.0, 1.0, 1.0]
+    assert ages.tolist() == [0.5, 0.5, 0.5]
+    assert (entrance.counts.stale, entrance.counts.rejected, entrance.counts.strangers) == (2, 2, 1)
+    stranger.sendto(encode(Distances(0, 0.0, np.full(3, 2.0))), entrance.address)  # after a silence: restarted
+    assert entrance.read(now=3.0)[0].tolist() == [2.0, 2.0, 2.0]
+    stranger.close()
+
+
+def test_the_sequence_wraps_around(wire) -> None:
+    entrance, exit_ = wire
+    exit_._seq = 2**32 - 1
+    for k in (1.0, 2.0):
+        exit_.send(np.full(3, k))
+        assert entrance.read(now=1.0)[0].tolist() == [k, k, k]
+    assert exit_._seq == 1
+
+
+def test_an_address_in_use_is_named(wire) -> None:
+    with pytest.raises(ConfigurationError, match=str(wire[0].address[1])):
+        SensorInput(3, port=wire[0].address[1])
