@@ -3,21 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, slots=True)
+class ServoGains(NamedTuple):
+    """Gains of a joint servo that the controller may set: a speed loop inside a position loop, arm side.
+
+    torque = Kv (v_ref - q̇) + Ki ∫(v_ref - q̇) dt + trqFfw with v_ref = velRef + Kp (posRef - q).
+
+    Attributes:
+        kp: Position loop (n,) [1/s].
+        kv: Speed loop (n,) [N m s/rad].
+        ki: Integral of the speed loop (n,) [N m/rad].
+    """
+
+    kp: NDArray[np.float64]
+    kv: NDArray[np.float64]
+    ki: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class JointReference:
-    """Joint references of one tick, arm side, SI.
+    """Joint references of one tick, arm side, SI. For the motor side, see `qpsafe.irc5.gears`.
+
+    Two are equal if all their numbers are, NaN included.
 
     Attributes:
         seq: Number of the tick, counting from 0.
         time: seq * dt [s].
-        q: Position reference (n,) [rad], finite and within limits.
-        qd: Velocity reference (n,) [rad/s]; `q` is the last `q` plus `qd` dt.
+        q: Position reference, posRef (n,) [rad], finite and within limits.
+        qd: Velocity reference, velRef (n,) [rad/s]; `q` is the last `q` plus `qd` dt.
         active: False until a first valid measurement told where the robot is: do not move on such a reference.
+        torque: Torque feed-forward, trqFfw (n,) [N m]; None for none, as EGM has no place for it.
+        gains: Gains that the servo shall use, Kp, Kv, Ki; None for its own.
     """
 
     seq: int
@@ -25,3 +46,22 @@ class JointReference:
     q: NDArray[np.float64]
     qd: NDArray[np.float64]
     active: bool = True
+    torque: NDArray[np.float64] | None = None
+    gains: ServoGains | None = None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, JointReference):
+            return NotImplemented
+        if (self.seq, self.active) != (other.seq, other.active) or not _same(self.time, other.time):
+            return False
+        mine, others = (r.gains if r.gains is not None else (None,) * 3 for r in (self, other))
+        pairs = zip((self.q, self.qd, self.torque, *mine), (other.q, other.qd, other.torque, *others), strict=True)
+        return all(_same(a, b) for a, b in pairs)
+
+    __hash__ = None  # type: ignore[assignment]  # holds arrays
+
+
+def _same(a: NDArray[np.float64] | float | None, b: NDArray[np.float64] | float | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return np.array_equal(a, b, equal_nan=True)

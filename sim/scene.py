@@ -11,6 +11,7 @@ World frame = robot base frame; the floor lies a pedestal's height below it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,7 @@ def build_scene(
     pedestal: float = 0.55,
     board: Board | None = None,
     contacts: bool = False,
+    furnish: Callable[[Any], None] | None = None,
 ) -> Scene:
     """Build the world around a robot.
 
@@ -92,6 +94,7 @@ def build_scene(
         board: Size of the card board and how it is held.
         contacts: Whether the robot can touch itself and the floor. Off by default: a run that relies on touching has
             failed anyway. The person never touches anything.
+        furnish: Adds more to the `mujoco.MjSpec` before it is compiled, e.g. `Cell.furnish`.
 
     Returns:
         The scene.
@@ -110,6 +113,8 @@ def build_scene(
     add_surroundings(spec, pedestal)
     _add_person(spec, person)
     spec.attach(mujoco.MjSpec.from_file(str(robot.model_path)), prefix="robot/", frame=spec.worldbody.add_frame())
+    if furnish is not None:
+        furnish(spec)
     model = spec.compile()
 
     joints = [_find(model, mujoco.mjtObj.mjOBJ_JOINT, name, robot) for name in robot.joint_names]

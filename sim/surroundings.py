@@ -87,10 +87,10 @@ def add_surroundings(spec: Any, pedestal: float) -> None:
         specular=[0.15] * 3,
         castshadow=True,
     )
-    _add_camera(world, CAMERA, [-3.95, -2.75, 2.25], [0.50, -0.10, 0.12], 28.0)
+    add_camera(world, CAMERA, [-3.95, -2.75, 2.25], [0.50, -0.10, 0.12], 28.0)
 
 
-def _add_camera(world: Any, name: str, position: list[float], target: list[float], fovy: float) -> None:
+def add_camera(world: Any, name: str, position: list[float], target: list[float], fovy: float) -> None:
     """A camera that looks at a point with the horizon level."""
     backward = np.subtract(position, target)
     backward /= np.linalg.norm(backward)

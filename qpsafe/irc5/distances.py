@@ -19,6 +19,7 @@ from __future__ import annotations
 import socket
 import struct
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -190,10 +191,8 @@ class SensorOutput:
 
     def send(self, values: Array, ages: Array | None = None) -> None:
         """Send one sampling; nobody listening is no error."""
-        try:
+        with suppress(OSError):
             self._socket.sendto(encode(Distances(self._seq, time.time(), values, ages)), self._address)
-        except OSError:
-            pass
         self._seq = (self._seq + 1) % 2**32
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The watchdog asks when heartbeats stop, and insists when nobody answers. Waits have wide bounds: no timing is judged."""
+"""The watchdog asks when heartbeats stop, and insists when nobody answers; no timing is judged, waits are wide."""
 
 import os
 import signal
