@@ -1,78 +1,13 @@
 """Draw the two-view picture of the IRB 140 in the documentation: ``MUJOCO_GL=egl python robots/irb140/picture.py``."""
 
-from __future__ import annotations
-
-import argparse
 from pathlib import Path
 
-import matplotlib.image
-import mujoco
-import numpy as np
-from numpy.typing import NDArray
+from qpsafe.robots.portrait import View, main
 
-HERE = Path(__file__).resolve().parent
-OUT = HERE.parents[1] / "docs" / "img" / "irb140.png"
-SCALE = 2  # rendered larger, then averaged: smooth edges from any back end
-
-
-def scene(width: int, height: int) -> mujoco.MjModel:
-    """The robot on a light floor before a light background, at most width x height pixels."""
-    spec = mujoco.MjSpec.from_string(f"""
-    <mujoco>
-      <visual>
-        <headlight ambient="0.42 0.42 0.42" diffuse="0.22 0.22 0.22" specular="0.1 0.1 0.1"/>
-        <global offwidth="{width}" offheight="{height}" fovy="24"/>
-        <quality shadowsize="8192" offsamples="8"/>
-        <rgba haze="1 1 1 1"/>
-        <map znear="0.02" shadowscale="0.5"/>
-      </visual>
-      <asset>
-        <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="32" height="32"/>
-        <material name="floor" rgba="1 1 1 1" emission="0.38" specular="0" shininess="0"/>
-      </asset>
-      <worldbody>
-        <light type="spot" cutoff="89" exponent="0" pos="0.9 -1.7 3.0" dir="-0.28 0.55 -0.85" diffuse="0.7 0.7 0.7"/>
-        <light type="spot" cutoff="89" exponent="0" pos="-1.2 1.8 2.2" dir="0.4 -0.65 -0.65" diffuse="0.25 0.25 0.25"
-               castshadow="false"/>
-        <geom type="plane" size="20 20 0.1" material="floor"/>
-      </worldbody>
-    </mujoco>""")
-    spec.attach(mujoco.MjSpec.from_file(str(HERE / "robot.xml")), frame=spec.worldbody.add_frame(), prefix="robot/")
-    return spec.compile()
-
-
-def view(
-    q_deg: list[float], azimuth: float, elevation: float, distance: float, lookat: list[float], size: tuple[int, int]
-) -> NDArray[np.uint8]:
-    """One view of the robot at a configuration [deg], as an image (height, width, 3)."""
-    width, height = size
-    model = scene(width * SCALE, height * SCALE)
-    data = mujoco.MjData(model)
-    data.qpos[:] = np.deg2rad(q_deg)
-    mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance, camera.lookat[:] = azimuth, elevation, distance, lookat
-    options = mujoco.MjvOption()
-    options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
-    options.sitegroup[:] = 0
-    with mujoco.Renderer(model, height * SCALE, width * SCALE) as renderer:
-        renderer.update_scene(data, camera, options)
-        pixels = renderer.render().astype(float)
-    pixels = pixels.reshape(height, SCALE, width, SCALE, 3).mean(axis=(1, 3))
-    return np.clip(np.round(pixels), 0, 255).astype(np.uint8)
-
-
-def main() -> None:
-    """Draw and save both views side by side."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=OUT)
-    out: Path = parser.parse_args().out
-    size = (560, 640)
-    left = view([0, 10, 10, 0, 60, 0], 138, -16, 2.55, [0.11, 0.0, 0.40], size)
-    right = view([-20, -35, 25, 0, 45, 0], 40, -18, 2.55, [0.06, 0.0, 0.40], size)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    matplotlib.image.imsave(out, np.hstack([left, right]))
-
+VIEWS = [
+    View([0, 10, 10, 0, 60, 0], 138, -16, 2.55, [0.11, 0.0, 0.40]),
+    View([-20, -35, 25, 0, 45, 0], 40, -18, 2.55, [0.06, 0.0, 0.40]),
+]
 
 if __name__ == "__main__":
-    main()
+    main(Path(__file__).resolve().parent, VIEWS, __doc__)
