@@ -22,7 +22,7 @@ import numpy as np
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.footsteps import Footsteps
 from qpsafe.sim.glide import Track
-from qpsafe.sim.person import Person, PersonPose
+from qpsafe.sim.person import Board, Person, PersonPose
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,11 @@ class Choreography:
         for key in ("ramp", "turn_time", "max_speed"):
             _check(key, getattr(self, key), lambda v: v > 0.0, "a finite number above 0")
         _check("turn", self.turn, lambda v: 0.0 <= v <= math.pi / 2, "0 to pi/2 rad")
+        if self.person.board is None:
+            raise ConfigurationError("Choreography", "person", self.person, "a person with a board")
         if not self.approaches:
             raise ConfigurationError("Choreography", "approaches", self.approaches, "at least one Approach")
-        home = self.home_radius - self.person.board.reach
+        home = self.home_radius - self.board.reach
         for i, a in enumerate(self.approaches):
             where = f"approaches[{i}]."
             _check(where + "azimuth", a.azimuth, lambda v: abs(v) <= math.pi, "-pi to pi rad")
@@ -133,7 +135,7 @@ class Choreography:
     @cached_property
     def _plan(self) -> tuple[Track, Track, Track, tuple[Phase, ...]]:
         """Radius, azimuth and turn of the root over time, and the phases."""
-        reach = self.person.board.reach
+        reach = self.board.reach
         radius, azimuth, turn = Track(self.home_radius), Track(self.approaches[0].azimuth), Track(0.0)
         phases: list[Phase] = []
         time = 0.0
@@ -171,6 +173,21 @@ class Choreography:
         return radius, azimuth, turn, tuple(phase for phase in phases if phase.end > phase.start)
 
     @property
+    def board(self) -> Board:
+        """What the person carries."""
+        assert self.person.board is not None  # checked on construction
+        return self.person.board
+
+    @property
+    def persons(self) -> tuple[Person, ...]:
+        """Who is there, for `build_scene(robot, people=...)`."""
+        return (self.person,)
+
+    def poses(self, time: float) -> tuple[PersonPose, ...]:
+        """Everybody at a time [s], for `scene.place_people`."""
+        return (self.pose(time),)
+
+    @property
     def phases(self) -> tuple[Phase, ...]:
         """What happens when, without gaps, from 0 to at least `duration`."""
         return self._plan[3]
@@ -197,7 +214,7 @@ class Choreography:
     def board_distance(self, time: float) -> float:
         """Horizontal distance from the robot's base axis to the nearest point of the board's face at a time [m]."""
         x, y, heading = self.root(time)
-        board = self.person.board
+        board = self.board
         ahead = x * math.cos(heading) + y * math.sin(heading) + board.reach  # the axis, seen from the board's face
         aside = max(abs(-x * math.sin(heading) + y * math.cos(heading)) - board.width / 2, 0.0)
         return math.hypot(ahead, aside)
@@ -207,7 +224,7 @@ class Choreography:
         """Largest speed of the root and of the board's centre, sampled every 10 ms [m/s]."""
         times = np.arange(0.0, self.duration + 0.005, 0.01)
         x, y, heading = np.array([self.root(t) for t in times]).T
-        board = x + self.person.board.reach * np.cos(heading), y + self.person.board.reach * np.sin(heading)
+        board = x + self.board.reach * np.cos(heading), y + self.board.reach * np.sin(heading)
         speeds = [np.hypot(np.diff(px), np.diff(py)) / 0.01 for px, py in ((x, y), board)]
         return float(np.max(speeds))
 

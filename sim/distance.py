@@ -36,9 +36,13 @@ class Distance(NamedTuple):
 
 
 def board_distance(scene: Scene, data: Any) -> Distance:
-    """Smallest distance of the robot's collision geoms to the board; geom poses of `data` up to date."""
+    """Smallest distance of the robot's collision geoms to a board, +inf without one; `data` is up to date."""
+    found = [_board_distance(scene, data, int(board)) for board in scene.board_geoms]
+    return min(found, key=lambda item: item.distance) if found else Distance(np.inf, *np.full((2, 3), np.nan))
+
+
+def _board_distance(scene: Scene, data: Any, board: int) -> Distance:
     centres = data.geom_xpos[scene.robot_geoms]
-    board = scene.board_geom
     # in the board's frame, the vector from the box to a point is what remains after clamping it into the box
     local = (centres - data.geom_xpos[board]) @ data.geom_xmat[board].reshape(3, 3)
     outside = np.maximum(np.abs(local) - scene.model.geom_size[board], 0.0)
@@ -48,7 +52,7 @@ def board_distance(scene: Scene, data: Any) -> Distance:
 
 
 def person_distance(scene: Scene, data: Any) -> Distance:
-    """Smallest distance of the robot's collision geoms to the person's body, without the board."""
+    """Smallest distance of the robot's collision geoms to anybody's body, without the boards."""
     model, robot, person = scene.model, scene.robot_geoms, scene.person_geoms
     radii, halves = model.geom_size[person, 0], model.geom_size[person, 1]
     axes = data.geom_xmat[person].reshape(-1, 3, 3)[:, :, 2]

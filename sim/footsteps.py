@@ -45,6 +45,7 @@ class Footsteps:
         swing: float = 0.44,
         stand: float = 0.11,
         lift: float = 0.055,
+        pace: Callable[[float], tuple[float, float]] | None = None,
     ) -> None:
         """Plan the steps.
 
@@ -55,24 +56,26 @@ class Footsteps:
             swing: Time a foot is in the air [s].
             stand: Time both feet stand between two steps [s].
             lift: Height of a full step [m].
+            pace: t [s] -> `swing` and `stand` then, for people who walk at many speeds.
         """
         self._lift = lift
         self._first = person.standing_feet(*walk(0.0))
         self.steps: tuple[list[Step], list[Step]] = ([], [])
         feet = list(self._first)
-        ahead = swing + swing / 2 + stand  # middle of the stance that follows a swing which starts now
         last, time = 1, 0.0
         while time < duration:
+            fly, rest = (swing, stand) if pace is None else pace(time)
+            ahead = fly + fly / 2 + rest  # middle of the stance that follows a swing which starts now
             wanted = person.standing_feet(*walk(min(time + ahead, duration)))
             errors = [_separation(foot, goal) for foot, goal in zip(feet, wanted, strict=True)]
             side = int(errors[1] > errors[0]) if abs(errors[0] - errors[1]) > 0.05 else 1 - last
             if errors[side] < 0.035:
                 time += 0.02
                 continue
-            self.steps[side].append(Step(time, time + swing, feet[side], wanted[side]))
+            self.steps[side].append(Step(time, time + fly, feet[side], wanted[side]))
             feet[side] = wanted[side]
             last = side
-            time += swing + stand
+            time += fly + rest
         self._starts = tuple([step.start for step in steps] for steps in self.steps)
 
     def __call__(self, time: float) -> tuple[Foot, Foot]:

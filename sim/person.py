@@ -1,8 +1,9 @@
-"""A person of 17 capsules who carries a card board upright in front of the chest.
+"""A person of 17 capsules who may carry a card board upright in front of the chest.
 
 The person is a stick figure with constant bone lengths: hips and shoulders follow the root, ankles and wrists are given
-(by the footsteps and by the board), and two-link inverse kinematics places knees and elbows. A capsule is symmetric
-about its axis, so the two end points of a bone say everything: no joints, no dynamics, nothing to integrate.
+(by the footsteps, by the board or by what the hands reach for), and two-link inverse kinematics places knees and
+elbows. A capsule is symmetric about its axis, so the two end points of a bone say everything: no joints, no dynamics,
+nothing to integrate.
 
 Frames: the root lies on the floor below the pelvis, x forward, y left, z up. World frame = robot base frame, in which
 the floor has the height `floor` (negative).
@@ -11,35 +12,20 @@ the floor has the height `floor` (negative).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.anatomy import (
-    ANKLE,
-    FOOT_RADIUS,
-    FOREARM,
-    HAND,
-    HEEL,
-    HEEL_OFF,
-    HIP,
-    LEG_USED,
-    SEGMENTS,
-    SHANK,
-    SHOULDER,
-    SHOULDER_HEIGHT,
-    THIGH,
-    TOE,
-    TRUNK,
-    UPPER_ARM,
-    Segment,
-)
+from qpsafe.sim.anatomy import FIRST, HEEL_OFF, LEG_USED, SEGMENTS, Body, Segment
+from qpsafe.sim.posture import Point, Posture, Stoop, least_stoop, place_hands
 
 __all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "Segment", "two_link"]
 
 Array = NDArray[np.float64]
+_Point = tuple[float, float, float]
 
 
 class Foot(NamedTuple):
@@ -81,19 +67,24 @@ class PersonPose:
         ends: The two end points of every capsule's axis, in the order of `SEGMENTS`, (17, 2, 3) [m].
         positions: Centres of the capsules, (17, 3) [m].
         quaternions: w, x, y, z; turns z into the capsules' axes, (17, 4).
-        board_position: Centre of the board, (3,) [m].
+        board_position: Centre of the board, (3,) [m]; None without one, like the next two.
         board_quaternion: w, x, y, z; board frame: x out of its face, y to its left, z up, (4,).
         board_face: Centre of the face away from the person, (3,) [m].
-        heading: Direction the person looks and the board faces [rad].
+        heading: Direction the person looks [rad].
     """
 
     ends: Array
     positions: Array
     quaternions: Array
-    board_position: Array
-    board_quaternion: Array
-    board_face: Array
+    board_position: Array | None
+    board_quaternion: Array | None
+    board_face: Array | None
     heading: float
+
+    @property
+    def hands(self) -> Array:
+        """Grips of the left and the right hand: the far ends of their axes (2, 3) [m]."""
+        return self.ends[[10, 16], 1]
 
 
 def two_link(roots: Array, targets: Array, upper: Array, lower: Array, bends: Array) -> tuple[Array, Array]:
@@ -137,59 +128,79 @@ class Person:
 
     Attributes:
         floor: Height of the floor in the world frame [m].
-        board: The card board.
+        board: The card board; None for a person without one.
+        body: How tall, and of what lengths.
     """
 
     floor: float = -0.55
-    board: Board = field(default_factory=Board)
+    board: Board | None = field(default_factory=Board)
+    body: Body = FIRST
 
     def standing_feet(self, x: float, y: float, heading: float) -> tuple[Foot, Foot]:
         """Left and right foot of a person who stands still at (x, y) [m], looking along `heading` [rad]."""
-        dx, dy = -math.sin(heading) * (HIP + 0.005), math.cos(heading) * (HIP + 0.005)
+        dx, dy = -math.sin(heading) * (self.body.hip + 0.005), math.cos(heading) * (self.body.hip + 0.005)
         return Foot(x + dx, y + dy, heading + 0.10), Foot(x - dx, y - dy, heading - 0.10)
 
-    def pose(self, x: float, y: float, heading: float, feet: tuple[Foot, Foot] | None = None) -> PersonPose:
+    def pose(
+        self,
+        x: float,
+        y: float,
+        heading: float,
+        feet: tuple[Foot, Foot] | None = None,
+        posture: Posture | None = None,
+    ) -> PersonPose:
         """Place the person.
 
         Args:
             x, y: Root, world frame [m].
             heading: Direction the person looks [rad].
             feet: Left and right foot; default standing still.
+            posture: What arms, back and head do; by default the board is held, or the arms hang.
 
         Returns:
             The poses of all capsules and of the board.
         """
         feet = feet or self.standing_feet(x, y, heading)
-        cos, sin = math.cos(heading), math.sin(heading)
-        # The farther a foot stands from below its hip, the lower the hips: the bob of an inverted pendulum. The lower
-        # of the two legs' wishes counts, rounded off where they cross.
-        leg, wishes = LEG_USED * (THIGH + SHANK), []
-        for side, foot in zip((HIP, -HIP), feet, strict=True):
-            away = math.hypot(foot.x - x + side * sin, foot.y - y - side * cos)
-            wishes.append(math.sqrt(leg**2 - min(away, 0.5) ** 2))
-        a, b = wishes
-        hip = ANKLE + 0.5 * (a + b - math.hypot(a - b, 0.01))
+        body, cos, sin = self.body, math.cos(heading), math.sin(heading)
+        soles = []  # ankle, heel and toe of each foot
+        for foot in feet:
+            dx, dy = foot.x - x, foot.y - y
+            soles.append(_roll(body, cos * dx + sin * dy, cos * dy - sin * dx, foot.yaw - heading, foot.lift))
+        board, lean, free = self.board, 0.0, posture is not None or self.board is None
+        reach, centre = (0.0, 0.0) if board is None else (board.reach, board.centre_height)
+        if not free:
+            hip = self._hip(x, y, cos, sin, feet)
+            wrists, fingers = self._edges(reach, centre)
+            shoulders = np.array([[0.0, body.shoulder, hip + body.trunk], [0.0, -body.shoulder, hip + body.trunk]])
+        else:
+            posture = posture or Posture()
+            hip, lean = self._hip_of_free(soles), posture.stoop.lean
+            reach, centre = posture.hold or (reach, centre)
+            ahead = [cos * (foot.x - x) + sin * (foot.y - y) for foot in feet]
+            edges = np.vstack((self._edges(reach, centre)[0], _FINGERS))
+            shoulders, wrists, fingers = place_hands(body, hip, posture.stoop, ahead[::-1], posture.arms, edges)
+            hip -= posture.stoop.crouch
 
         # Everything in the root's frame first: x forward, y left, z up from the floor.
         ends = np.empty((len(SEGMENTS), 2, 3))
-        ends[:5] = TRUNK
+        ends[:5] = body.frame
+        if posture is not None:
+            _bend(ends, lean, posture.gaze)
         ends[:5, :, 2] += hip
 
-        board = self.board
         roots, targets, bends = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
         for i, (side, foot) in enumerate(zip((1.0, -1.0), feet, strict=True)):
-            dx, dy, yaw = foot.x - x, foot.y - y, foot.yaw - heading
-            ankle, heel, toe = _roll(cos * dx + sin * dy, cos * dy - sin * dx, yaw, foot.lift)
-            roots[i], targets[i] = (0.0, side * HIP, hip), ankle
+            yaw, (ankle, heel, toe) = foot.yaw - heading, soles[i]
+            roots[i], targets[i] = (0.0, side * body.hip, hip), ankle
             bends[i] = 1.0 + 0.5 * math.cos(yaw), 0.5 * math.sin(yaw), 0.0  # knees point forwards and along the toes
             ends[5 + 6 * i + 2] = heel, toe
-            # fingers at the board's edge, a little below its middle
-            edge_x, edge_y = board.reach - board.thickness / 2, side * (board.width / 2 + 0.012)
-            wrist = (edge_x - 0.055, edge_y, board.centre_height - 0.07)
-            roots[2 + i], targets[2 + i] = (0.0, side * SHOULDER, hip + SHOULDER_HEIGHT), wrist
-            bends[2 + i] = -0.2, 0.55 * side, -1.0
-            ends[5 + 6 * i + 5, 1] = wrist[0] + _FINGERS[0], wrist[1], wrist[2] + _FINGERS[1]
-        middles, tips = two_link(roots, targets, _UPPER, _LOWER, bends)
+            roots[2 + i], targets[2 + i] = shoulders[i], wrists[i]
+            # elbows down and outwards at the board; those of free arms also back, which is where hanging arms bend
+            bends[2 + i] = (-0.8, 0.35 * side, -1.0) if free else (-0.2, 0.55 * side, -1.0)
+            ends[5 + 6 * i + 5, 1] = fingers[i]
+        upper = np.array([body.thigh, body.thigh, body.upper_arm, body.upper_arm])
+        lower = np.array([body.shank, body.shank, body.forearm, body.forearm])
+        middles, tips = two_link(roots, targets, upper, lower, bends)
         for i in (0, 1):
             row = 5 + 6 * i
             ends[row, 0], ends[row, 1] = middles[i], roots[i]  # thigh
@@ -202,30 +213,99 @@ class Person:
         origin = np.array([x, y, self.floor])
         ends = ends @ rotation.T + origin
         axes = ends[:, 1] - ends[:, 0]
-        face = rotation @ (board.reach, 0.0, board.centre_height) + origin
+        face, thickness, facing = None, 0.0, heading
+        if board is not None:
+            thickness = board.thickness
+            if posture is not None and posture.resting is not None:
+                *place, facing, centre = posture.resting
+                face = np.array([*place, centre + self.floor])
+            else:
+                face = rotation @ (reach, 0.0, centre) + origin
+        out = np.array([math.cos(facing), math.sin(facing), 0.0])
         return PersonPose(
             ends=ends,
             positions=0.5 * (ends[:, 0] + ends[:, 1]),
             quaternions=_axis_quaternions(axes / np.sqrt((axes * axes).sum(axis=1))[:, None]),
-            board_position=face - board.thickness / 2 * rotation[:, 0],
-            board_quaternion=np.array([math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)]),
+            board_position=None if face is None else face - thickness / 2 * out,
+            board_quaternion=None if face is None else np.array([math.cos(facing / 2), 0, 0, math.sin(facing / 2)]),
             board_face=face,
             heading=heading,
         )
 
+    def least_stoop(self, goals: Sequence[Point | str], hold: tuple[float, float] | None = None) -> tuple[Stoop, float]:
+        """The least stoop for goals of both arms when standing, and by how much they are too short even so [m]."""
+        body, board = self.body, self.board
+        hold = hold or ((0.0, 0.0) if board is None else (board.reach, board.centre_height))
+        hip = body.ankle + LEG_USED * (body.thigh + body.shank)
+        return least_stoop(body, hip, goals, np.vstack((self._edges(*hold)[0], _FINGERS)))
 
-_UPPER = np.array([THIGH, THIGH, UPPER_ARM, UPPER_ARM])
-_LOWER = np.array([SHANK, SHANK, FOREARM, FOREARM])
-_FINGERS = HAND * math.cos(0.18), HAND * math.sin(0.18)  # from the wrist forwards and a little up
-_Point = tuple[float, float, float]
+    def _edges(self, reach: float, centre: float) -> tuple[Array, Array]:
+        """Wrists and fingers (2, 3) that hold the board's edges a little below its middle; root's frame."""
+        wrists, fingers, board = np.zeros((2, 3)), np.zeros((2, 3)), self.board
+        for i, side in enumerate((1.0, -1.0) if board is not None else ()):
+            edge_x, edge_y = reach - board.thickness / 2, side * (board.width / 2 + 0.012)  # type: ignore[union-attr]
+            wrists[i] = edge_x - 0.055, edge_y, centre - 0.07
+            fingers[i] = wrists[i] + self.body.hand * np.array(_FINGERS)
+        return wrists, fingers
+
+    def _hip(self, x: float, y: float, cos: float, sin: float, feet: tuple[Foot, Foot]) -> float:
+        """Height of the hips.
+
+        The farther a foot stands from below its hip, the lower the hips: the bob of an inverted pendulum. The lower
+        of the two legs' wishes counts, rounded off where they cross.
+        """
+        half = self.body.hip
+        leg, wishes = LEG_USED * (self.body.thigh + self.body.shank), []
+        for side, foot in zip((half, -half), feet, strict=True):
+            away = math.hypot(foot.x - x + side * sin, foot.y - y - side * cos)
+            wishes.append(math.sqrt(leg**2 - min(away, 0.5) ** 2))
+        a, b = wishes
+        return self.body.ankle + 0.5 * (a + b - math.hypot(a - b, 0.01))
+
+    def _hip_of_free(self, soles: Sequence[tuple[_Point, _Point, _Point]]) -> float:
+        """Height of the hips of somebody who walks at any speed: as high as both legs allow, rounded off."""
+        body, leg = self.body, LEG_USED * (self.body.thigh + self.body.shank)
+        heights = []
+        for side, ((x, y, z), _, _) in zip((body.hip, -body.hip), soles, strict=True):
+            heights.append(z + math.sqrt(leg**2 - min(math.hypot(x, y - side), 0.70 * leg) ** 2))
+        # a trailing foot on its toes, or a lifted one, would allow more than standing does
+        upright = body.ankle + leg
+        left, right = heights
+        return _lower(_lower(left, right, 0.03) + 0.012, upright + 0.01, 0.02)
 
 
-def _roll(x: float, y: float, yaw: float, lift: float) -> tuple[_Point, _Point, _Point]:
+def _lower(a: float, b: float, rounding: float) -> float:
+    """The lower of two heights, rounded off where they cross [m]."""
+    return 0.5 * (a + b - math.hypot(a - b, rounding))
+
+
+_FINGERS = math.cos(0.18), 0.0, math.sin(0.18)  # at the board, from the wrist forwards and a little up
+
+
+def _bend(ends: Array, lean: float, gaze: tuple[float, float]) -> None:
+    """Bend the trunk forwards about the hips, and tilt the head; heights above the hips."""
+    neck = ends[1, 1].copy()
+    tilt = math.hypot(*gaze)
+    if tilt > 0.0:  # the head about the upper end of the neck, towards where it looks
+        c, s, towards = math.cos(tilt), math.sin(tilt), np.array([gaze[0] / tilt, gaze[1] / tilt, 0.0])
+        for k in (0, 1):
+            part = ends[2, k] - neck
+            level = float(part @ towards)
+            ends[2, k] += (level * (c - 1.0) + part[2] * s) * towards
+            ends[2, k, 2] += part[2] * (c - 1.0) - level * s
+    if lean > 0.0:
+        c, s = math.cos(lean), math.sin(lean)
+        for k in (0, 1, 2, 4):
+            x, z = ends[k, :, 0].copy(), ends[k, :, 2].copy()
+            ends[k, :, 0], ends[k, :, 2] = c * x + s * z, c * z - s * x
+
+
+def _roll(body: Body, x: float, y: float, yaw: float, lift: float) -> tuple[_Point, _Point, _Point]:
     """Ankle, heel and toe in the root's frame; a foot that trails rolls up over its toes, which stay where they are."""
     c, s = math.cos(yaw), math.sin(yaw)
     share = min(max((-(x * c + y * s) - 0.06) / 0.26, 0.0), 1.0)
     roll = HEEL_OFF * share**2 * (3.0 - 2.0 * share)
-    toe = (x + TOE * c, y + TOE * s, lift + FOOT_RADIUS)
+    toe = (x + body.toe * c, y + body.toe * s, lift + body.foot_radius)
     back, rise = math.cos(roll), math.sin(roll)  # along the sole from the toes
 
     def on_sole(length: float, height: float) -> _Point:
@@ -233,4 +313,4 @@ def _roll(x: float, y: float, yaw: float, lift: float) -> tuple[_Point, _Point, 
         horizontal = height * rise - length * back
         return toe[0] + horizontal * c, toe[1] + horizontal * s, toe[2] + length * rise + height * back
 
-    return on_sole(TOE, ANKLE - FOOT_RADIUS), on_sole(HEEL + TOE, 0.0), toe
+    return on_sole(body.toe, body.ankle - body.foot_radius), on_sole(body.heel + body.toe, 0.0), toe

@@ -1,9 +1,9 @@
-"""The world in MuJoCo: the robot on its pedestal, the floor, the person and the board, light and camera.
+"""The world in MuJoCo: the robot on its pedestal, the floor, people with or without a board, light and camera.
 
-The robot's own file holds the robot only; it is attached here. The person and the board are mocap bodies, one per
-segment: they are put where the choreography says and push nothing. Geometry groups: 0 floor and pedestal, 1 person and
-board (what the distance sensors see), 2 and 3 the robot as seen and as it collides. Names of the robot's file have the
-prefix "robot/".
+The robot's own file holds the robot only; it is attached here. People and boards are mocap bodies, one per segment:
+they are put where the choreography or the story says and push nothing. Geometry groups: 0 floor and pedestal, 1 people
+and boards (what the distance sensors see), 2 and 3 the robot as seen and as it collides. Names of the robot's file have
+the prefix "robot/".
 
 World frame = robot base frame; the floor lies a pedestal's height below it.
 """
@@ -11,8 +11,8 @@ World frame = robot base frame; the floor lies a pedestal's height below it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.anatomy import CARDBOARD, SEGMENTS
+from qpsafe.sim.anatomy import CARDBOARD
 from qpsafe.sim.person import Board, Person, PersonPose
 from qpsafe.sim.surroundings import CAMERA, SCENERY, add_surroundings
 
@@ -39,26 +39,26 @@ class Scene:
     Attributes:
         model: The MuJoCo model; share it, make one `MjData` a run with `make_data`.
         robot: The robot that was built in.
-        person: Kinematics of the person, with this scene's floor and board.
+        people: Kinematics of everybody, with this scene's floor.
         q_addresses: Of the robot's joints in `qpos`, in `robot.joint_names` order, (n,).
         v_addresses: The same in `qvel`, (n,).
         actuators: Actuator of each joint, (n,).
         robot_geoms: Collision geoms of the robot (group 3).
-        person_geoms: Geom of each segment, in the order of `SEGMENTS`, (17,).
-        board_geom: Geom of the board.
+        person_geoms: Geom of each segment of everybody, person by person in the order of `SEGMENTS`, (17 p,).
+        board_geoms: Geom of each board, (b,).
         tcp_site: Site at the tip of the tool, -1 if the robot has none.
         pedestal: Height of the robot's base above the floor [m].
     """
 
     model: Any
     robot: Robot
-    person: Person
+    people: tuple[Person, ...]
     q_addresses: NDArray[np.intp]
     v_addresses: NDArray[np.intp]
     actuators: NDArray[np.intp]
     robot_geoms: NDArray[np.intp]
     person_geoms: NDArray[np.intp]
-    board_geom: int
+    board_geoms: NDArray[np.intp]
     tcp_site: int
     pedestal: float
 
@@ -69,11 +69,35 @@ class Scene:
         mujoco.mj_forward(self.model, data)
         return data
 
-    def place_person(self, data: Any, pose: PersonPose) -> None:
-        """Put the person and the board where `pose` says and bring all geom poses up to date."""
-        data.mocap_pos[:-1], data.mocap_quat[:-1] = pose.positions, pose.quaternions
-        data.mocap_pos[-1], data.mocap_quat[-1] = pose.board_position, pose.board_quaternion
+    @property
+    def person(self) -> Person:
+        """The first person."""
+        return self.people[0]
+
+    @property
+    def board_geom(self) -> int:
+        """Geom of the first board, -1 if there is none."""
+        return int(self.board_geoms[0]) if len(self.board_geoms) else -1
+
+    def place_people(self, data: Any, poses: Sequence[PersonPose]) -> None:
+        """Put everybody, in the order of `people`, and their boards where the poses say; all geom poses are updated."""
+        at = self._mocap
+        for pose in poses:
+            data.mocap_pos[at : at + 17], data.mocap_quat[at : at + 17] = pose.positions, pose.quaternions
+            at += 17
+            if pose.board_position is not None:
+                data.mocap_pos[at], data.mocap_quat[at] = pose.board_position, pose.board_quaternion
+                at += 1
         mujoco.mj_kinematics(self.model, data)
+
+    def place_person(self, data: Any, pose: PersonPose) -> None:
+        """Put the first person and the board where `pose` says and bring all geom poses up to date."""
+        self.place_people(data, (pose,))
+
+    @property
+    def _mocap(self) -> int:
+        """First mocap body of the people; theirs follow one another."""
+        return int(self.model.body_mocapid[self.model.geom_bodyid[self.person_geoms[0]]]) if self.people else 0
 
 
 def build_scene(
@@ -84,6 +108,7 @@ def build_scene(
     board: Board | None = None,
     contacts: bool = False,
     furnish: Callable[[Any], None] | None = None,
+    people: Sequence[Person] | None = None,
 ) -> Scene:
     """Build the world around a robot.
 
@@ -91,10 +116,11 @@ def build_scene(
         robot: From `load_robot`; its model needs one motor per joint, named like the joint.
         timestep: Of the physics [s].
         pedestal: Height of the robot's base above the floor [m].
-        board: Size of the card board and how it is held.
+        board: Size of the card board and how it is held, for the one person of the source's experiments.
         contacts: Whether the robot can touch itself and the floor. Off by default: a run that relies on touching has
-            failed anyway. The person never touches anything.
+            failed anyway. People never touch anything.
         furnish: Adds more to the `mujoco.MjSpec` before it is compiled, e.g. `Cell.furnish`.
+        people: Who is there, each with a board or without; by default one person with `board`. Floors are set here.
 
     Returns:
         The scene.
@@ -106,12 +132,13 @@ def build_scene(
         raise ConfigurationError("build_scene", "timestep", timestep, "0 to 0.004 s")
     if not (math.isfinite(pedestal) and 0.0 < pedestal <= 2.0):
         raise ConfigurationError("build_scene", "pedestal", pedestal, "0 to 2 m")
-    person = Person(floor=-pedestal, board=board or Board())
+    everybody = (Person(board=board or Board()),) if people is None else people
+    everybody = tuple(replace(person, floor=-pedestal) for person in everybody)
     spec = mujoco.MjSpec()
     spec.modelname = f"{robot.name} and a person"
     _set_options(spec, timestep, contacts)
     add_surroundings(spec, pedestal)
-    _add_person(spec, person)
+    names = [_add_person(spec, person, k) for k, person in enumerate(everybody)]
     spec.attach(mujoco.MjSpec.from_file(str(robot.model_path)), prefix="robot/", frame=spec.worldbody.add_frame())
     if furnish is not None:
         furnish(spec)
@@ -121,13 +148,13 @@ def build_scene(
     return Scene(
         model=model,
         robot=robot,
-        person=person,
+        people=everybody,
         q_addresses=model.jnt_qposadr[joints].astype(np.intp),
         v_addresses=model.jnt_dofadr[joints].astype(np.intp),
         actuators=np.array([_find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, n, robot) for n in robot.joint_names], np.intp),
         robot_geoms=np.flatnonzero(model.geom_group == ROBOT_COLLISION),
-        person_geoms=np.array([model.geom(f"person/{segment.name}").id for segment in SEGMENTS], np.intp),
-        board_geom=int(model.geom("person/board").id),
+        person_geoms=np.array([model.geom(n).id for some in names for n in some if "/board" not in n], np.intp),
+        board_geoms=np.array([model.geom(n).id for some in names for n in some if "/board" in n], np.intp),
         tcp_site=int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "robot/tcp")),
         pedestal=pedestal,
     )
@@ -153,24 +180,30 @@ def _set_options(spec: Any, timestep: float, contacts: bool) -> None:
         option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
 
 
-def _add_person(spec: Any, person: Person) -> None:
-    """One mocap body per segment, then the board, all far away until they are placed."""
+def _add_person(spec: Any, person: Person, number: int) -> list[str]:
+    """One mocap body per segment, then the board, all far away until they are placed; returns the geoms' names."""
     looks = {"group": PERSON, "contype": 0, "conaffinity": 0}
-    for i, segment in enumerate(SEGMENTS):
-        body = spec.worldbody.add_body(name=f"person/{segment.name}", mocap=True, pos=[50.0 + i, 0.0, 0.0])
+    prefix, far = f"person{number + 1 if number else ''}/", 50.0 + 20.0 * number
+    names = []
+    for i, segment in enumerate(person.body.segments):
+        names.append(prefix + segment.name)
+        body = spec.worldbody.add_body(name=names[-1], mocap=True, pos=[far + i, 0.0, 0.0])
         body.add_geom(
-            name=f"person/{segment.name}",
+            name=names[-1],
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             size=[segment.radius, segment.length / 2, 0.0],
             rgba=segment.colour,
             **looks,
         )
-    body = spec.worldbody.add_body(name="person/board", mocap=True, pos=[49.0, 0.0, 0.0])
     board = person.board
-    body.add_geom(
-        name="person/board",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[board.thickness / 2, board.width / 2, board.height / 2],
-        rgba=CARDBOARD,
-        **looks,
-    )
+    if board is not None:
+        names.append(prefix + "board")
+        body = spec.worldbody.add_body(name=names[-1], mocap=True, pos=[far - 1.0, 0.0, 0.0])
+        body.add_geom(
+            name=names[-1],
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[board.thickness / 2, board.width / 2, board.height / 2],
+            rgba=CARDBOARD,
+            **looks,
+        )
+    return names

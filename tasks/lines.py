@@ -25,7 +25,7 @@ def key_lines(text: str) -> dict[Key, int]:
     table: Key = ()
     for number, line in enumerate(text.splitlines(), start=1):
         if head := _HEAD.match(line):
-            table = _split(head.group(2))
+            table = _inside(found, _split(head.group(2)))
             if head.group(1) == "[[":
                 count = sum(1 for key in found if key[:-1] == table and isinstance(key[-1], int))
                 table = (*table, count)
@@ -33,6 +33,16 @@ def key_lines(text: str) -> dict[Key, int]:
         elif key := _KEY.match(line):
             found.setdefault((*table, *_split(key.group(1))), number)
     return found
+
+
+def _inside(found: dict[Key, int], table: Key) -> Key:
+    """A header's key with the numbers of the array tables it is in: the latest of each."""
+    key: Key = ()
+    for part in table[:-1]:
+        key = (*key, part)
+        count = sum(1 for other in found if other[:-1] == key and isinstance(other[-1], int))
+        key = (*key, count - 1) if count else key
+    return (*key, *table[-1:])
 
 
 def _split(dotted: str) -> Key:
