@@ -75,7 +75,9 @@ def test_the_binary_log_keeps_every_bit(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_controllers_references_go_through(ending: str, tmp_path: Path) -> None:
     robot = qpsafe.load_robot("irb140")
-    controller = qpsafe.SafetyController(robot, [qpsafe.PositionTask("tcp", robot.pose("tcp", robot.home)[:3, 3])])
+    controller = qpsafe.SafetyController(
+        robot, [qpsafe.PositionTask("tcp", qpsafe.FixedPose(robot.pose("tcp", robot.home)))]
+    )
     ticks = [controller.step(robot.home, np.zeros(6), points=np.zeros((0, 3))).reference for _ in range(3)]
     write_references(tmp_path / f"run{ending}", ticks)
     assert read_references(tmp_path / f"run{ending}").references == ticks

@@ -1,0 +1,290 @@
+"""One EGM session without its socket: datagrams in, one answer for each packet of the robot out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.inbox import Arrival, Inbox, Sender
+from qpsafe.irc5.messages import RobotPacket, SensorPacket, encode_sensor
+from qpsafe.irc5.rules import SessionRules
+from qpsafe.irc5.shaper import Shaper
+from qpsafe.limits import JointLimits
+from qpsafe.reference import JointReference
+
+Array = NDArray[np.float64]
+
+
+class Phase(StrEnum):
+    """What the robot is being answered."""
+
+    WAITING = "waiting"  # nothing yet: it has not spoken
+    HOLDING = "holding"  # its own measured pose, at speed 0: motors off, motion control or RAPID program not running
+    RAMPING = "ramping"  # the source, blended in from the measured pose
+    RUNNING = "running"  # the source
+    STOPPING = "stopping"  # a pose that comes to rest
+    STOPPED = "stopped"  # a pose at rest, until acknowledged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cycle:
+    """A packet to answer.
+
+    Attributes:
+        packet: What the robot says.
+        qd: Measured joint velocity (n,) [rad/s], by the robot's clock from this packet and the one before.
+        phase: What it will be answered.
+        seeded: The reference was set to the measured pose: let the source of references start anew from it.
+        missed: Packets missing since the last cycle, lost or superseded by this one.
+        deviation: How far every joint is from what it was sent (n,) [rad].
+        notes: What is unusual, in words.
+    """
+
+    packet: RobotPacket
+    qd: Array
+    phase: Phase
+    seeded: bool
+    missed: int
+    deviation: Array
+    notes: tuple[str, ...] = ()
+
+    @property
+    def moving(self) -> bool:
+        """Whether the answer follows the source of references."""
+        return self.phase in (Phase.RAMPING, Phase.RUNNING)
+
+
+class EgmSession:
+    """Answers a robot, whatever it and its end of the wire do. Never raises in the loop.
+
+    For each packet: `offer` the datagrams that arrived, `take` the cycle, `answer` it once. The robot's packets are the
+    clock: one answer is one tick of the limits' dt.
+
+    Args:
+        limits: Of the joints; no answer that moves the robot goes beyond them, whatever the source of references does.
+        rules: How to ramp, and what counts as wrong.
+        peer: Address of the robot; by default that of the first valid packet.
+        joint_names: For the reports.
+
+    Attributes:
+        phase: Now.
+        causes: Why it stopped, until acknowledged.
+        counts: What became of datagrams (see `Inbox`), and: ``answered``, ``superseded`` (dropped for a newer packet),
+            ``bad_reference`` (of the source: none, inactive or unusable; the robot brakes meanwhile), ``clipped``.
+        q, qd: The reference last answered (n,) [rad, rad/s].
+
+    Raises:
+        ConfigurationError: Limits are no JointLimits, or the names are not one a joint.
+    """
+
+    def __init__(
+        self,
+        limits: JointLimits,
+        rules: SessionRules | None = None,
+        peer: str | None = None,
+        joint_names: Sequence[str] | None = None,
+    ) -> None:
+        if not isinstance(limits, JointLimits):
+            raise ConfigurationError("EgmSession", "limits", limits, "a JointLimits")
+        self.limits = limits
+        self.rules = SessionRules() if rules is None else rules
+        self.n = len(limits.lower)
+        self.names = tuple(joint_names or (f"joint_{i + 1}" for i in range(self.n)))
+        if len(self.names) != self.n:
+            raise ConfigurationError("EgmSession", "joint_names", joint_names, f"{self.n} names")
+        self.inbox = Inbox(limits.lower, limits.upper, self.rules, peer)
+        self.counts: Counter[str] = self.inbox.counts
+        self.phase = Phase.WAITING
+        self.causes: tuple[str, ...] = ()
+        self._shaper = Shaper(limits, self.rules.ramp_in, self.rules.ramp_out, self.rules.catch_up)
+        self._recent = np.zeros((max(1, round(self.rules.lag / limits.dt)), self.n))  # what was sent last, a ring
+        self._arrival: Arrival | None = None
+        self._anew, self._missed = False, 0
+        self._cycle: Cycle | None = None
+        self._before: RobotPacket | None = None
+        self._source: JointReference | None = None
+        self._rest: Array | None = None
+        self._seq, self._now = 0, 0.0
+        self._relax = False
+
+    @property
+    def q(self) -> Array:
+        """Position last answered (n,) [rad]."""
+        return self._shaper.q
+
+    @property
+    def qd(self) -> Array:
+        """Speed last answered (n,) [rad/s]."""
+        return self._shaper.qd
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the last answer leaves the robot standing."""
+        return self.phase not in (Phase.RAMPING, Phase.RUNNING, Phase.STOPPING) and not self.qd.any()
+
+    @property
+    def sender(self) -> Sender | None:
+        """Whom to answer: the robot's address and port, None before its first valid packet."""
+        return self.inbox.sender
+
+    def offer(self, data: bytes, sender: Sender, now: float) -> bool:
+        """Take in a datagram; `now` is a monotonic clock [s]. Returns whether it is the newest packet of the robot."""
+        self._now = now
+        arrival = self.inbox.offer(data, sender, now)
+        if arrival is None:
+            return False
+        if self._arrival is not None:
+            self.counts["superseded"] += 1
+            self._missed += 1
+        self._arrival = arrival
+        self._anew |= arrival.restarted or bool(self._closed(arrival.packet))  # even if superseded
+        self._missed = 0 if arrival.restarted else self._missed + arrival.missed
+        return True
+
+    def stop(self, cause: str) -> None:
+        """Bring the robot to rest, and hold it until `acknowledge`."""
+        if cause not in self.causes:
+            self.causes = (*self.causes, cause)
+        if self.phase in (Phase.RAMPING, Phase.RUNNING):
+            self.phase = Phase.STOPPING
+        elif self.phase != Phase.STOPPING:
+            self.phase = Phase.STOPPED
+
+    def acknowledge(self) -> None:
+        """A person has seen to the cause of the stop: from the next packet on, references are ramped in again."""
+        if self.phase == Phase.STOPPED:
+            self.phase, self.causes = Phase.HOLDING, ()
+
+    def take(self) -> Cycle | None:
+        """The cycle of the newest packet, once; None if none has arrived."""
+        arrival, self._arrival = self._arrival, None
+        if arrival is None:
+            return None
+        anew, missed = self._anew, self._missed
+        self._anew, self._missed = False, 0
+        packet = arrival.packet
+        qd = np.zeros(self.n) if arrival.restarted else self._velocity(packet)
+        self._before = packet
+        notes = [f"{missed} packets missed"] if missed else []
+
+        closed = self._closed(packet)
+        seeded = anew or self.phase in (Phase.WAITING, Phase.HOLDING)
+        deviation = np.zeros(self.n)
+        if seeded:
+            self._seed(packet.q)
+            stopped = self.phase in (Phase.STOPPING, Phase.STOPPED)
+            self.phase = Phase.STOPPED if stopped else Phase.HOLDING if closed else Phase.RAMPING
+            notes += closed + (["the robot started anew"] if arrival.restarted else [])
+        else:
+            if missed:  # it went on at the last speed for as long as nothing else arrived
+                self._remember(self.q + self.qd * min(missed * self.limits.dt, self.rules.lag))
+            low, high = self._recent.min(axis=0), self._recent.max(axis=0)
+            deviation = np.maximum(np.maximum(low - packet.q, packet.q - high), 0.0)
+            self._check(deviation)
+        if self.causes:
+            notes.append("stopped: " + "; ".join(self.causes))
+        self._cycle = Cycle(packet, qd, self.phase, seeded, missed, deviation, tuple(notes))
+        return self._cycle
+
+    def answer(self, reference: JointReference | None) -> bytes | None:
+        """The answer to the cycle taken last; None if it was answered before.
+
+        Args:
+            reference: Of the source for this tick, starting at the measured pose when the cycle was `seeded`. None, or
+                one that cannot be used, makes the robot brake for this tick. Only looked at if the cycle is `moving`.
+        """
+        cycle, self._cycle = self._cycle, None
+        if cycle is None:
+            return None
+        if self.phase in (Phase.RAMPING, Phase.RUNNING):
+            self._follow(reference)
+        if self.phase == Phase.STOPPING:  # maybe since a moment ago
+            if self._shaper.brake():
+                self.phase = Phase.STOPPED
+                self._rest = cycle.packet.q if self._relax else None
+        elif self.phase == Phase.STOPPED and self._rest is not None:
+            self._shaper.settle(self._rest)
+        self._remember(self.q)
+        data = encode_sensor(SensorPacket(self._seq, int(self._now * 1e3), self.q, self.qd))
+        self._seq += 1
+        self.counts["answered"] += 1
+        return data
+
+    def _follow(self, reference: JointReference | None) -> None:
+        usable = _usable(reference, self.n)
+        if usable is None:
+            self.counts["bad_reference"] += 1
+            self._shaper.brake()
+            return
+        jump = self._jump(usable)
+        if jump:
+            self.stop(jump)
+            return
+        self._source = usable
+        self._shaper.follow(usable.q, usable.qd)
+        self.counts["clipped"] += self._shaper.clipped
+        if self._shaper.weight >= 1.0:
+            self.phase = Phase.RUNNING
+
+    def _seed(self, q: Array) -> None:
+        self._shaper.seed(q)
+        self._recent[:] = q
+        self._source, self._relax, self._rest = None, False, None
+
+    def _remember(self, q: Array) -> None:
+        self._recent[:-1] = self._recent[1:]
+        self._recent[-1] = q
+
+    def _check(self, deviation: Array) -> None:
+        if self.phase == Phase.STOPPED or (deviation <= self.rules.deviation).all():
+            return
+        worst = int(np.argmax(deviation))
+        self._relax = True  # once at rest, do not go on pushing against what holds the robot back
+        self.stop(f"{self.names[worst]} is {deviation[worst]:.3g} rad from what it was sent")
+
+    def _jump(self, reference: JointReference) -> str:
+        """What the source did that no source within the limits does, in words."""
+        last, start = self._source, self._shaper.q
+        ticks = 1 if last is None else max(1, min(reference.seq - last.seq, self.rules.most_missed))
+        moved = np.abs(reference.q - (start if last is None else last.q))
+        excess = moved - self.limits.max_velocity * self.limits.dt * ticks
+        worst = int(np.argmax(excess))
+        if excess[worst] <= self.rules.jump:
+            return ""
+        place = "the measured pose" if last is None else "its last one"
+        return f"the reference of {self.names[worst]} is {moved[worst]:.3g} rad from {place}"
+
+    def _velocity(self, packet: RobotPacket) -> Array:
+        """By differences over the robot's own clock; 0 where that makes no sense."""
+        before = self._before
+        if before is None or before.clock is None or packet.clock is None:
+            return np.zeros(self.n)
+        elapsed = packet.clock - before.clock
+        if not 0.5 * self.limits.dt <= elapsed <= 1.0:
+            return np.zeros(self.n)
+        return (packet.q - before.q) / elapsed
+
+    def _closed(self, packet: RobotPacket) -> list[str]:
+        """What keeps the robot from being driven, in words."""
+        states = {"motion control": packet.mci, "the RAPID program": packet.rapid}
+        found = [] if packet.motors_on else ["motors are off"]
+        return found + [f"{name} is {state}" for name, state in states.items() if state != "running"]
+
+
+def _usable(reference: JointReference | None, n: int) -> JointReference | None:
+    """The reference as finite numbers, one a joint; None if it is inactive or something else."""
+    try:
+        if reference is None or not reference.active:
+            return None
+        q, qd = np.array(reference.q, dtype=np.float64), np.array(reference.qd, dtype=np.float64)
+        if not (q.shape == qd.shape == (n,) and np.isfinite(q).all() and np.isfinite(qd).all()):
+            return None
+        return JointReference(int(reference.seq), 0.0, q, qd)
+    except Exception:  # whatever it was, no robot is driven by it
+        return None
