@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.danger.activation import Activation, Threshold
+from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.problem import Law, LawResult
 from qpsafe.limits import JointLimits
@@ -23,20 +24,18 @@ if TYPE_CHECKING:
 ABSURD_STEP = 1e3
 
 
-def default_activation(tasks: tuple[Task, ...]) -> Activation:
-    """The source's thresholds: (18) for one task, (22) for two."""
-    if len(tasks) == 1:
-        return Activation((Threshold(11.5, 0.15),))
-    if len(tasks) == 2:
-        return Activation()
+def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
+    """The robot's thresholds (the IRB 140's are the source's): (18) for one task, (22) for two."""
+    if len(tasks) <= 2:
+        return Activation(robot_thresholds(robot)[: len(tasks)])
     raise ConfigurationError(
         "SafetyController", "activation", None, f"an Activation with {len(tasks)} thresholds for as many tasks"
     )
 
 
-def checked_activation(tasks: tuple[Task, ...], activation: Activation | None) -> Activation:
+def checked_activation(tasks: tuple[Task, ...], activation: Activation | None, robot: Robot) -> Activation:
     """The given activation, or the default one, if it has as many thresholds as there are tasks."""
-    activation = default_activation(tasks) if activation is None else activation
+    activation = default_activation(tasks, robot) if activation is None else activation
     if len(activation.thresholds) != len(tasks):
         found = f"{len(activation.thresholds)} thresholds"
         raise ConfigurationError("SafetyController", "activation", found, f"{len(tasks)}")

@@ -45,7 +45,7 @@ class SafetyController:
         law: How tasks and evasion are combined; `HierarchicalLaw()` by default.
         dt: Tick [s]; the IRC5 wants 0.004.
         field: The danger field; the source's weights by default.
-        activation: Thresholds of the tasks; the source's for one or two tasks.
+        activation: Thresholds of the tasks; the robot's for one or two tasks (the source's on the IRB 140).
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; None switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
@@ -82,7 +82,7 @@ class SafetyController:
         self.law = HierarchicalLaw() if law is None else law
         self.dt = float(dt)
         self.field = DangerField() if field is None else field
-        self.activation = checked_activation(self.tasks, activation)
+        self.activation = checked_activation(self.tasks, activation, robot)
         self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
         own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
         self.limits = own if isinstance(limits, str) else limits
@@ -127,7 +127,7 @@ class SafetyController:
         check_parts(self.robot, self.dt, None, activation, None, None)
         if activation is None and len(tasks) == len(self.tasks):
             activation = self.activation
-        activation = checked_activation(tuple(tasks), activation)
+        activation = checked_activation(tuple(tasks), activation, self.robot)
         self.tasks, self.activation = tuple(tasks), activation
         self.recovery.set_tasks(self.tasks, activation.suspend_above, restart)
 

@@ -1,13 +1,15 @@
 """When tasks are released: the smooth activations m and f, eqs. (19) and (21), and the regimes of Table I.
 
 Every task has one threshold. With the danger rising, the task of lowest priority is released first. For two tasks the
-source's parameters are a_1 = m and a_2 = m f, and the regimes are its low, medium and high danger.
+source's parameters are a_1 = m and a_2 = m f, and the regimes are its low, medium and high danger. Neighbouring tasks
+with equal thresholds are released together, by one switch: the positions of two tools at m, their orientations at m f.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +63,9 @@ class Activation:
     """Activations 1 >= a_1 >= ... >= a_N >= 0 of N tasks, highest priority first, from the danger CDF_n.
 
     Args:
-        thresholds: One per task, highest priority first. Defaults to the source's values for two tasks:
-            Δ = 11.5, ε = 0.15 for the high-priority task (m) and Δ_f = 7.5, ε_f = 0.25 for the low one (f).
+        thresholds: One per task, highest priority first; equal neighbours share a switch. Defaults to the source's
+            values for two tasks: Δ = 11.5, ε = 0.15 for the high-priority task (m) and Δ_f = 7.5, ε_f = 0.25 for the
+            low one (f).
 
     Raises:
         ConfigurationError: A task would begin its release before one of lower priority is released completely,
@@ -73,9 +76,12 @@ class Activation:
         self.thresholds = tuple(thresholds)
         if not self.thresholds:
             raise ConfigurationError("Activation", "thresholds", thresholds, "at least one Threshold")
+        # the different ones, and the number of tasks that each one switches
+        self.levels = tuple(threshold for threshold, _ in groupby(self.thresholds))
+        self._counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
         for k in range(len(self.thresholds) - 1):
             upper, lower = self.thresholds[k], self.thresholds[k + 1]
-            if lower.end > upper.start:
+            if lower != upper and lower.end > upper.start:
                 raise ConfigurationError(
                     "Activation",
                     f"thresholds[{k + 1}]",
@@ -89,16 +95,16 @@ class Activation:
         return self.thresholds[0].start
 
     def switches(self, cdf_n: float) -> tuple[float, ...]:
-        """The switches (m, f, ...) of eqs. (19), (21), one per task, each in [0, 1]."""
-        return tuple(threshold(cdf_n) for threshold in self.thresholds)
+        """The switches (m, f, ...) of eqs. (19), (21), one per level of danger, each in [0, 1]."""
+        return tuple(threshold(cdf_n) for threshold in self.levels)
 
     def activations(self, cdf_n: float) -> tuple[float, ...]:
-        """Activations a_k = product of the first k switches: (m, m f, ...)."""
+        """Activations a_1..a_N = products of the first switches: (m, m f, ...); (m, m, m f, m f) for two and two."""
         result: list[float] = []
         product = 1.0
-        for switch in self.switches(cdf_n):
+        for switch, count in zip(self.switches(cdf_n), self._counts, strict=True):
             product *= switch
-            result.append(product)
+            result += [product] * count
         return tuple(result)
 
     def kept(self, cdf_n: float) -> int:
@@ -108,10 +114,10 @@ class Activation:
     def regime(self, cdf_n: float) -> str:
         """Name of the danger level (Table I): ``low``, ``medium`` or ``high``.
 
-        A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two tasks
-        the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
+        A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two different
+        thresholds the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
         """
-        n, kept = len(self.thresholds), self.kept(cdf_n)
+        n, kept = len(self.levels), sum(1 for threshold in self.levels if cdf_n <= threshold.start)
         if n in REGIME_NAMES:
             return REGIME_NAMES[n][kept]
         return "high" if kept == 0 else "low" if kept == n else f"medium-{kept}"

@@ -13,8 +13,8 @@ from qpsafe.errors import RobotFileError
 from qpsafe.robot.dh import dh_frames
 from qpsafe.robot.model_file import read_model, spec_from_model
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.schema import RobotFile, read_robot_file
-from qpsafe.robot.spec import RobotSpec, Tool
+from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
+from qpsafe.robot.spec import DHChain, RobotSpec, Tool
 
 _TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
 
@@ -121,8 +121,12 @@ def _to_spec(path: Path, file: RobotFile, model: Any) -> RobotSpec:
                     f"within the joint's range in {file.model}, {low / rad:g} to {high / rad:g} {file.units.angle}"
                 )
                 raise RobotFileError(path, f"joints.{name}.{key}", value, expected)
-    tool = file.tool
-    table = file.denavit_hartenberg
+    chains = []
+    for table in file.denavit_hartenberg:
+        rows = np.array([[rad * r.theta, m * r.d, m * r.a, rad * r.alpha] for r in table.rows])
+        order = names if table.joints is None else table.joints
+        chains.append(DHChain(rows, tuple(table.frames), tuple(names.index(name) for name in order)))
+    danger = file.danger
     spots = None if file.spots is None else path.parent / file.spots
     return RobotSpec(
         name=file.name,
@@ -139,9 +143,9 @@ def _to_spec(path: Path, file: RobotFile, model: Any) -> RobotSpec:
         home=rad * np.array([home[name] for name in names]),
         frames=dict(file.frames),
         wire_frames=tuple((start, end) for start, end in file.wire.links),
-        tool=None if tool is None else Tool(tool.frame, tool.mounted_on, m * np.array(tool.offset), tool.mass),
-        dh=None if table is None else np.array([[rad * r.theta, m * r.d, m * r.a, rad * r.alpha] for r in table.rows]),
-        dh_frames=() if table is None else tuple(table.frames),
+        tools=tuple(Tool(t.frame, t.mounted_on, m * np.array(t.offset), t.mass) for t in file.tool),
+        chains=tuple(chains),
+        danger=None if danger is None else ((danger.delta, danger.epsilon), (danger.delta_f, danger.epsilon_f)),
     )
 
 
@@ -150,18 +154,21 @@ def _check_kinematics(path: Path, robot: Robot) -> None:
     rng = np.random.default_rng(0)
     for q in (robot.home, *rng.uniform(robot.lower, robot.upper, (3, robot.nq))):
         state = robot.at(q)
-        if robot.dh is not None:
-            for i, (frame, pose) in enumerate(zip(robot.dh_frames, dh_frames(robot.dh, q), strict=True)):
-                error = np.abs(state.pose(frame) - pose).max()
+        for k, chain in enumerate(robot.chains):
+            base = state.pose(chain.frames[0])
+            for i, (frame, pose) in enumerate(
+                zip(chain.frames, dh_frames(chain.table, q[list(chain.joints)]), strict=True)
+            ):
+                error = np.abs(state.pose(frame) - base @ pose).max()
                 if not error < _TOLERANCE:
-                    key = f"denavit_hartenberg.rows[{max(i - 1, 0)}]"
+                    row = max(i - 1, 0)
+                    key = f"{table_key('denavit_hartenberg', k, len(robot.chains))}.rows[{row}]"
                     expected = f"the pose of frame {frame} in {robot.model_path.name}; they differ by {error:.3g}"
-                    raise RobotFileError(path, key, (robot.dh[max(i - 1, 0)]).tolist(), expected)
-        if robot.tool is not None:
-            mount = state.pose(robot.tool.mounted_on)
-            offset = mount[:3, :3].T @ (state.position(robot.tool.frame) - mount[:3, 3])
-            if not np.abs(offset - robot.tool.offset).max() < _TOLERANCE:
-                expected = (
-                    f"{np.round(offset, 6).tolist()} m, where {robot.model_path.name} has frame {robot.tool.frame}"
-                )
-                raise RobotFileError(path, "tool.offset", robot.tool.offset.tolist(), expected)
+                    raise RobotFileError(path, key, chain.table[row].tolist(), expected)
+        for k, tool in enumerate(robot.tools):
+            mount = state.pose(tool.mounted_on)
+            offset = mount[:3, :3].T @ (state.position(tool.frame) - mount[:3, 3])
+            if not np.abs(offset - tool.offset).max() < _TOLERANCE:
+                expected = f"{np.round(offset, 6).tolist()} m, where {robot.model_path.name} has frame {tool.frame}"
+                key = f"{table_key('tool', k, len(robot.tools))}.offset"
+                raise RobotFileError(path, key, tool.offset.tolist(), expected)

@@ -40,9 +40,14 @@ class Robot:
         ends: How many these are, k.
         tree: The joints as compiled code sees them, taken from the model.
         memory: Floats in the kinematics of one configuration.
-        tool: The mounted tool, or None.
-        dh: Standard Denavit-Hartenberg table (theta, d, a, alpha), (n, 4), or None.
+        tools: The mounted tools, one an arm.
+        tool: The first of them, or None.
+        tool_frames: Frames at the tips of the tools; the last frame of the wire where no tool is named.
+        chains: Published Denavit-Hartenberg tables, one an arm.
+        dh: The table (theta, d, a, alpha) of a robot with one, (n, 4), or None.
         dh_frames: Names of the frames of that table.
+        danger: (Δ, ε) and (Δ_f, ε_f) as the robot's file states them, or None.
+        notes: What is missing or doubtful in the robot's files, in words; empty if nothing is.
         spots_path: File of the distance sensors, or None where there is none.
         model: The pinocchio model.
     """
@@ -62,9 +67,14 @@ class Robot:
         self.max_velocity = _read_only(spec.max_velocity)
         self.max_acceleration = _read_only(spec.max_acceleration)
         self.home = _read_only(spec.home)
-        self.tool: Tool | None = spec.tool
-        self.dh = None if spec.dh is None else _read_only(spec.dh)
-        self.dh_frames = spec.dh_frames
+        self.tools: tuple[Tool, ...] = spec.tools
+        self.tool: Tool | None = spec.tools[0] if spec.tools else None
+        self.tool_frames = tuple(tool.frame for tool in spec.tools) or (spec.wire_frames[-1][1],)
+        self.chains = spec.chains
+        self.dh = _read_only(spec.chains[0].table) if len(spec.chains) == 1 else None
+        self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
+        self.danger = spec.danger
+        self.notes = spec.notes
         self.frame_names = tuple(spec.frames)
         self._frame_ids = {name: int(model.getFrameId(target)) for name, target in spec.frames.items()}
         self.wire_frames = spec.wire_frames

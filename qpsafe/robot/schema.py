@@ -19,6 +19,7 @@ from qpsafe.errors import RobotFileError
 
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
+Fraction = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0, lt=1)]
 Name = Annotated[str, pydantic.Field(strict=True, min_length=1)]
 Pair = Annotated[list[Name], pydantic.Field(min_length=2, max_length=2)]
 
@@ -67,10 +68,11 @@ class DHRow(_Table):
 
 
 class DenavitHartenberg(_Table):
-    """The table, one row a joint, and the frames it leads to, one more than rows."""
+    """The table, one row a joint, the frames it leads to, one more than rows, and its joints if these are not all."""
 
     frames: list[Name]
     rows: list[DHRow]
+    joints: list[Name] | None = None
 
 
 class WireTable(_Table):
@@ -90,6 +92,15 @@ class ToolTable(_Table):
     mass: Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, ge=0)]
 
 
+class DangerTable(_Table):
+    """Thresholds of the danger field for this robot: Δ, ε of eq. (19) and Δ_f, ε_f of eq. (21)."""
+
+    delta: Positive
+    epsilon: Fraction
+    delta_f: Positive
+    epsilon_f: Fraction
+
+
 class RobotFile(_Table):
     """A whole `robot.toml`, in the units of the file."""
 
@@ -101,10 +112,17 @@ class RobotFile(_Table):
     home: list[Number]
     units: Units
     joints: Annotated[dict[str, JointLimits], pydantic.Field(min_length=1)]
-    denavit_hartenberg: DenavitHartenberg | None = None
+    denavit_hartenberg: tuple[DenavitHartenberg, ...] = ()
     frames: Annotated[dict[str, Name], pydantic.Field(min_length=1)]
     wire: WireTable
-    tool: ToolTable | None = None
+    tool: tuple[ToolTable, ...] = ()
+    danger: DangerTable | None = None
+
+    @pydantic.field_validator("tool", "denavit_hartenberg", mode="before")
+    @classmethod
+    def _one_or_many(cls, value: Any) -> Any:
+        """[tool] for one, [[tool]] for several."""
+        return [value] if isinstance(value, dict) else value
 
 
 def read_robot_file(path: Path) -> RobotFile:
@@ -130,7 +148,7 @@ def read_robot_file(path: Path) -> RobotFile:
     try:
         file = RobotFile.model_validate(raw)
     except pydantic.ValidationError as error:
-        raise _named_error(path, error) from error
+        raise _named_error(path, error, raw) from error
     check(path, file)
     return file
 
@@ -153,18 +171,31 @@ def check(path: Path, file: RobotFile) -> None:
             raise RobotFileError(path, f"home[{i}]", value, expected)
     for i, link in enumerate(file.wire.links):
         _known_frames(path, f"wire.links[{i}]", link, file.frames)
-    if file.tool is not None:
-        _known_frames(path, "tool.frame", [file.tool.frame], file.frames)
-        _known_frames(path, "tool.mounted_on", [file.tool.mounted_on], file.frames)
-    if file.denavit_hartenberg is not None:
-        table = file.denavit_hartenberg
-        if len(table.rows) != len(file.joints):
-            expected = f"{len(file.joints)} rows, one a joint"
-            raise RobotFileError(path, "denavit_hartenberg.rows", f"{len(table.rows)} rows", expected)
+    for i, tool in enumerate(file.tool):
+        key = table_key("tool", i, len(file.tool))
+        _known_frames(path, f"{key}.frame", [tool.frame], file.frames)
+        _known_frames(path, f"{key}.mounted_on", [tool.mounted_on], file.frames)
+    for i, table in enumerate(file.denavit_hartenberg):
+        key = table_key("denavit_hartenberg", i, len(file.denavit_hartenberg))
+        joints = list(file.joints) if table.joints is None else table.joints
+        for name in joints:
+            if name not in file.joints:
+                raise RobotFileError(path, f"{key}.joints", name, "one of the joints: " + ", ".join(file.joints))
+        if len(table.rows) != len(joints):
+            raise RobotFileError(path, f"{key}.rows", f"{len(table.rows)} rows", f"{len(joints)} rows, one a joint")
         if len(table.frames) != len(table.rows) + 1:
             expected = f"{len(table.rows) + 1} frames: the base's and one a joint"
-            raise RobotFileError(path, "denavit_hartenberg.frames", table.frames, expected)
-        _known_frames(path, "denavit_hartenberg.frames", table.frames, file.frames)
+            raise RobotFileError(path, f"{key}.frames", table.frames, expected)
+        _known_frames(path, f"{key}.frames", table.frames, file.frames)
+    danger = file.danger
+    if danger is not None and danger.delta_f * (1.0 + danger.epsilon_f) > danger.delta * (1.0 - danger.epsilon):
+        expected = "delta_f (1 + epsilon_f) <= delta (1 - epsilon), or two levels of Table I overlap"
+        raise RobotFileError(path, "danger.delta_f", danger.delta_f, expected)
+
+
+def table_key(name: str, i: int, count: int) -> str:
+    """How a person finds table i of several, or the only one."""
+    return name if count == 1 else f"{name}[{i}]"
 
 
 def _known_frames(path: Path, key: str, names: list[str], frames: dict[str, str]) -> None:
@@ -182,10 +213,13 @@ def _syntax_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> Robo
     return RobotFileError(path, f"line {number}", line, f"valid TOML ({error})")
 
 
-def _named_error(path: Path, error: pydantic.ValidationError) -> RobotFileError:
+def _named_error(path: Path, error: pydantic.ValidationError, raw: dict[str, Any]) -> RobotFileError:
     """The first complaint of pydantic, as file, key, value and what was expected."""
     first = error.errors()[0]
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+    parts = list(first["loc"])
+    if len(parts) > 1 and isinstance(raw.get(str(parts[0])), dict) and parts[1] == 0:
+        del parts[1]  # the only one of tables of which there may be several
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
     value: Any = first["input"]
     expected = first["msg"].removeprefix("Input should be ")
     if first["type"] == "missing":

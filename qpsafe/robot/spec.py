@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +26,20 @@ class Tool(NamedTuple):
     mass: float
 
 
+class DHChain(NamedTuple):
+    """One published kinematic chain.
+
+    Attributes:
+        table: Standard Denavit-Hartenberg, columns theta, d, a, alpha, (k, 4) [rad, m, m, rad].
+        frames: Names of the k + 1 frames it leads through; the first one stands still.
+        joints: Places of the k joints among the robot's.
+    """
+
+    table: NDArray[np.float64]
+    frames: tuple[str, ...]
+    joints: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class RobotSpec:
     """A robot described in SI units; arrays are in the order of the model's joints.
@@ -43,9 +57,10 @@ class RobotSpec:
         home: A pose to start from, (n,) [rad].
         frames: Frame name -> name of a site, body or link of the model.
         wire_frames: Start and end frame of each segment of the wire model.
-        tool: The mounted tool, if there is one.
-        dh: Standard Denavit-Hartenberg table, columns theta, d, a, alpha, (n, 4) [rad, m, m, rad], or None.
-        dh_frames: Names of the n + 1 frames of the table, or empty.
+        tools: The mounted tools, one an arm; none where the file names none.
+        chains: Published Denavit-Hartenberg tables, one an arm; none where the file has none.
+        danger: (Δ, ε) and (Δ_f, ε_f) of this robot, or None: then by the rule of `qpsafe.danger.thresholds`.
+        notes: What is missing or doubtful in the robot's files, in words.
         spots_path: File of distance sensors, or None where there is none.
         manufacturer: Who makes it.
     """
@@ -62,8 +77,9 @@ class RobotSpec:
     home: NDArray[np.float64]
     frames: dict[str, str]
     wire_frames: tuple[tuple[str, str], ...]
-    tool: Tool | None = None
-    dh: NDArray[np.float64] | None = None
-    dh_frames: tuple[str, ...] = field(default=())
+    tools: tuple[Tool, ...] = ()
+    chains: tuple[DHChain, ...] = ()
+    danger: tuple[tuple[float, float], tuple[float, float]] | None = None
+    notes: tuple[str, ...] = ()
     spots_path: Path | None = None
     manufacturer: str = ""

@@ -83,3 +83,27 @@ def test_overlapping_thresholds_are_refused_by_name() -> None:
 def test_wrong_threshold_values_are_refused(delta: float, epsilon: float) -> None:
     with pytest.raises(ConfigurationError):
         Threshold(delta, epsilon)
+
+
+def test_equal_neighbours_are_released_together() -> None:
+    """Two tools: positions kept at m, orientations at m f, and the same three regimes as one tool has."""
+    from qpsafe.danger.activation import Activation, Threshold, regime_weights
+
+    one, two = Activation(), Activation((Threshold(11.5, 0.15),) * 2 + (Threshold(7.5, 0.25),) * 2)
+    for danger in [*np.linspace(0.0, 20.0, 201), float("nan"), float("inf")]:
+        m, mf = one.activations(danger)
+        assert two.activations(danger) == (m, m, mf, mf)
+        assert two.switches(danger) == one.switches(danger)
+        assert two.regime(danger) == one.regime(danger)
+        assert two.kept(danger) == 2 * one.kept(danger)
+        high, nothing, medium, nothing_either, low = regime_weights(two.activations(danger))
+        assert nothing == nothing_either == 0.0
+        np.testing.assert_array_equal((high, medium, low), regime_weights((m, mf)))
+    assert two.suspend_above == one.suspend_above
+
+
+def test_tasks_apart_by_another_one_are_not_neighbours() -> None:
+    from qpsafe.danger.activation import Activation, Threshold
+
+    with pytest.raises(ConfigurationError, match=r"thresholds\[2\]"):
+        Activation((Threshold(11.5, 0.15), Threshold(7.5, 0.25), Threshold(11.5, 0.15)))
