@@ -53,7 +53,7 @@ class RobotPacket:
 
     Attributes:
         seq: Sequence number, counts modulo 2^32.
-        time_ms: The controller's time [ms], modulo 2^32.
+        time_ms: The controller's time [ms], modulo 2^32; 0 if it was left out.
         q: Measured joint positions (n,) [rad].
         q_planned: Joint positions that the controller plans (n,) [rad], or None.
         motors_on: Whether the motors are known to be on.
@@ -81,7 +81,7 @@ class SensorPacket:
 
     Attributes:
         seq: Sequence number, counts modulo 2^32.
-        time_ms: The sender's time [ms], modulo 2^32.
+        time_ms: The sender's time [ms], modulo 2^32; 0 if it was left out.
         q_ref: Joint positions (n,) [rad].
         qd_ref: Joint speeds (n,) [rad/s].
     """
@@ -184,8 +184,8 @@ def _parse(message: Any, data: bytes) -> Any:
 
 def _check_header(message: Any, kind: int) -> None:
     header = message.header
-    if not (header.HasField("seqno") and header.HasField("tm") and header.HasField("mtype")):
-        raise MalformedPacket(INCOMPLETE, "the header lacks seqno, tm or mtype")
+    if not (header.HasField("seqno") and header.HasField("mtype")):  # tm is left out by some
+        raise MalformedPacket(INCOMPLETE, "the header lacks seqno or mtype")
     if header.mtype != kind:
         raise MalformedPacket(WRONG_KIND, f"message type {header.mtype}, expected {kind}")
 

@@ -83,11 +83,18 @@ def test_what_must_be_there_is_asked_for(field: str) -> None:
     assert refused(message) == {"header": messages.INCOMPLETE, "feedBack": messages.WRONG_JOINT_COUNT}[field]
 
 
-@pytest.mark.parametrize("field", ["seqno", "tm", "mtype"])
+@pytest.mark.parametrize("field", ["seqno", "mtype"])
 def test_a_header_must_be_whole(field: str) -> None:
     message = a_robot()
     message.header.ClearField(field)
     assert refused(message) == messages.INCOMPLETE
+
+
+def test_a_header_may_lack_its_time() -> None:
+    """Known senders leave it out."""
+    message = a_robot()
+    message.header.ClearField("tm")
+    assert messages.decode_robot(message.SerializeToString(), N).time_ms == 0
 
 
 @pytest.mark.parametrize("kind", [0, 1, 3, 4])
