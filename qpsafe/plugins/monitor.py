@@ -1,0 +1,168 @@
+"""What the plug-ins of one robot share in a tick: detected points, danger, evasive velocity, admissible speeds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.checks import check_parts
+from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
+from qpsafe.danger.activation import Activation
+from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
+from qpsafe.danger.field import DangerField, danger_vectors
+from qpsafe.errors import ConfigurationError
+from qpsafe.limits import Box, JointLimits
+from qpsafe.robot.robot import Robot
+from qpsafe.robot.state import RobotState
+from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
+from qpsafe.tasks.trajectory import checked_pose
+from qpsafe.tick import BAD_INPUT, OK
+
+Array = NDArray[np.float64]
+
+
+class DangerMonitor:
+    """Danger of the detected points, eqs. (1)-(8), and the evasive velocity, (14)-(16): `update` it once a tick.
+
+    It does what `SafetyController.step` does before its law, for a loop that has a law of its own.
+
+    Args:
+        robot: The robot whose wire makes the field.
+        dt: Tick [s], the same as given to `solve_ik`.
+        field: The danger field; the source's weights by default.
+        activation: Thresholds, the highest priority's first; the source's for two tasks by default.
+        evasion: The admittance (16).
+        limits: Joint limits, by default the robot's; None for none.
+        ramp: A task that danger released comes back within this time at the earliest, and is released within a tenth
+            of it [s]; 0 for at once. Here no path waits for the robot, as in section IV-C.
+        base: Where the robot stands in the world of the points, a pose (4, 4); at the origin by default.
+
+    Attributes:
+        state: The robot as last measured, None if that was no usable measurement.
+        qd: Its joint velocity (n,) [rad/s].
+        points: Detected points (p, 3), in the robot's own world frame [m].
+        danger: CDF at the points (p,).
+        cdf_n: Largest of them, 0 without points; NaN where the input was bad.
+        switches: (m, f, ...) of eqs. (19), (21), smoothed by `ramp`; all 0 where the input was bad: the robot brakes.
+        qd0: Evasive velocity (n,) [rad/s].
+        box: Joint velocities that the limits admit, None without limits or a usable measurement.
+        status: ``"ok"`` or ``"bad input"``.
+        message: What was wrong with the input, else empty.
+
+    Raises:
+        ConfigurationError: Names the argument that is wrong.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        dt: float = 0.004,
+        *,
+        field: DangerField | None = None,
+        activation: Activation | None = None,
+        evasion: Evasion | None = None,
+        limits: JointLimits | str | None = "robot",
+        ramp: float = 0.5,
+        base: ArrayLike | None = None,
+    ) -> None:
+        if not hasattr(robot, "wire_frames"):
+            raise ConfigurationError("DangerMonitor", "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
+        if not (isinstance(dt, int | float) and not isinstance(dt, bool) and math.isfinite(dt) and dt > 0.0):
+            raise ConfigurationError("DangerMonitor", "dt", dt, "a finite time > 0 [s]")
+        if not (math.isfinite(ramp) and ramp >= 0.0):
+            raise ConfigurationError("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]")
+        check_parts(robot, dt, field, activation, evasion, limits)
+        self.robot, self.dt = robot, float(dt)
+        self.field = DangerField() if field is None else field
+        self.activation = Activation() if activation is None else activation
+        self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
+        own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
+        self.limits = own if isinstance(limits, str) else limits
+        self.ramp = float(ramp)
+        self._base = None if base is None else checked_pose("DangerMonitor", "base", base)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: no points, no evasive velocity."""
+        self.evasion.reset()
+        self.ticks = 0
+        self.box: Box | None = None
+        self._bad("not updated yet")
+        self.status, self.message = OK, ""
+        self._last = (1.0,) * len(self.switches)
+
+    @property
+    def m(self) -> float:
+        """Switch (19) of the task of highest priority."""
+        return self.switches[0]
+
+    def update(self, q: ArrayLike, qd: ArrayLike, points: ArrayLike) -> None:
+        """Take in one tick. Never raises on data: bad input is reported in `status`, and the robot brakes.
+
+        Args:
+            q: Joint position (n,) [rad].
+            qd: Joint velocity (n,) [rad/s], e.g. what the last `solve_ik` returned.
+            points: Detected points (p, 3) [m]; an empty list where nothing is in sight.
+        """
+        self.ticks += 1
+        try:
+            self._take(q, qd, points)
+        except BadInput as problem:
+            self._bad(str(problem))
+            self.qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # what was known fades
+
+    def _take(self, q: ArrayLike, qd: ArrayLike, points: ArrayLike) -> None:
+        q, qd = as_joint_position(q, self.robot), as_joint_velocity(qd, self.robot)
+        state = self.robot.at(q)
+        wire = state.wire(qd)
+        if self._base is not None:
+            points = _into(self._base, points)
+        seen = as_detection(state, wire, None, None, points)
+        danger, gradient = self.field.evaluate(seen.points, wire)  # (5)
+        vectors = danger_vectors(danger, gradient)  # (6)
+        torque = virtual_torque(
+            state, link_vectors(vectors, seen.links, len(self.robot.wire_frames))
+        )  # (8), (14), (15)
+        if not (np.isfinite(danger).all() and np.isfinite(torque).all()):
+            raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
+        self.state: RobotState | None = state
+        self.qd, self.points, self.danger = qd, seen.points, danger
+        self.cdf_n = float(danger.max(initial=0.0))
+        self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
+        self.qd0 = self.evasion.step(torque).copy()  # (16)
+        self.box = None if self.limits is None else self.limits.box(q, qd)
+        self.status, self.message = OK, ""
+
+    def _ramped(self, switches: tuple[float, ...]) -> tuple[float, ...]:
+        """Fall within a few ticks, with the time constant ramp / 25; rise by at most dt / ramp.
+
+        A tool that turns back raises its own danger: speed, danger and switch form a loop without any delay, which
+        chatters if the switch answers in full at once.
+        """
+        if self.ramp > 0.0:
+            rise, fall = self.dt / self.ramp, self.dt / (self.dt + self.ramp / 25.0)
+            pairs = zip(switches, self._last, strict=True)
+            switches = tuple(min(now, last + rise) if now > last else last + fall * (now - last) for now, last in pairs)
+        self._last = switches
+        return switches
+
+    def _bad(self, message: str) -> None:
+        n = self.robot.nq
+        self.state, self.qd, self.qd0 = None, np.zeros(n), np.zeros(n)
+        self.points, self.danger, self.cdf_n = np.empty((0, 3)), np.empty(0), math.nan
+        self.switches = self._last = (0.0,) * len(self.activation.thresholds)
+        self.box = None
+        self.status, self.message = BAD_INPUT, message
+
+
+def _into(base: Array, points: ArrayLike) -> ArrayLike:
+    """Points of the world as seen from the base; what is no (p, 3) array is left to the check behind."""
+    try:
+        array = np.asarray(points)
+    except Exception:  # whatever a stranger's __array__ raises
+        return points
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
+        return points
+    return (array - base[:3, 3]) @ base[:3, :3]

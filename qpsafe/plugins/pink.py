@@ -1,0 +1,131 @@
+"""For pink: `EvasiveTask`, `DangerLimit`, `JointLimit` and others go into an existing call of `pink.solve_ik`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.plugins.joints import JointMap, pinocchio_joints
+from qpsafe.plugins.monitor import DangerMonitor
+from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, release
+from qpsafe.robot.robot import Robot
+from qpsafe.tasks.task import Task
+
+try:
+    from pink.limits import Limit as PinkLimit
+    from pink.tasks import Task as PinkTask
+except ImportError as error:
+    raise MissingExtraError(f"pink is not installed: pip install 'qpsafe[pink]' ({error})") from error
+
+Array = NDArray[np.float64]
+
+__all__ = ["ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask"]
+
+
+class EvasiveTask(EvasiveRows, PinkTask):  # type: ignore[misc]
+    """Moves the robot away from danger: Δq = q̇0 dt, eq. (16), at a cost that grows with the danger.
+
+    As `qpsafe.plugins.mink.EvasiveTask`, with the same arguments.
+    """
+
+    def __init__(self, danger: DangerMonitor, cost: ArrayLike = 0.03, against: float = 1.0, prefix: str = "") -> None:
+        self.set_up(danger, cost, against, prefix)
+        super().__init__(cost=self._calm_cost, gain=1.0, lm_damping=0.0)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def __repr__(self) -> str:
+        return f"EvasiveTask(cost={self.cost}, against={self.against})"
+
+
+class ClikTask(ClikRows, PinkTask):  # type: ignore[misc]
+    """One of qpsafe's tasks as pink's, the same rows exactly: J Δq = (ẋ_d + K e) dt.
+
+    As `qpsafe.plugins.mink.ClikTask`, with the same arguments.
+    """
+
+    def __init__(self, task: Task, robot: Robot, dt: float, cost: ArrayLike = 1.0, prefix: str = "") -> None:
+        self.set_up(task, robot, dt, prefix)
+        rows = len(task.jacobian(robot.at(robot.home)))
+        super().__init__(cost=checked_cost("ClikTask", cost, rows), gain=1.0, lm_damping=0.0)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def __repr__(self) -> str:
+        return f"ClikTask({self.task.name}, cost={self.cost}, dt={self.dt})"
+
+
+class ReleasableTask(PinkTask):  # type: ignore[misc]
+    """One of pink's tasks, released in danger before the first one, as Table I releases the low-priority task.
+
+    As `qpsafe.plugins.mink.ReleasableTask`, with the same arguments.
+    """
+
+    def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
+        count = len(danger.activation.thresholds)
+        if not 1 <= priority <= count:
+            raise ConfigurationError("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold")
+        super().__init__(cost=task.cost, gain=task.gain, lm_damping=task.lm_damping)
+        self.task, self.danger, self.priority = task, danger, priority
+
+    def compute_error(self, configuration: Any) -> Array:
+        """The task's own."""
+        return np.asarray(self.task.compute_error(configuration))
+
+    def compute_jacobian(self, configuration: Any) -> Array:
+        """The task's own."""
+        return np.asarray(self.task.compute_jacobian(configuration))
+
+    def compute_qp_objective(self, configuration: Any) -> tuple[Array, Array]:
+        """The task's objective times a_k / a_1."""
+        weight = release(self.danger, self.priority)
+        H, c = self.task.compute_qp_objective(configuration)
+        return weight * H, weight * c
+
+    def __repr__(self) -> str:
+        return f"ReleasableTask({self.task!r}, priority={self.priority})"
+
+
+class DangerLimit(DangerRows, PinkLimit):  # type: ignore[misc]
+    """A cap on the danger field at the detected points: CDF(q, q̇, p) <= Δ_max.
+
+    As `qpsafe.plugins.mink.DangerLimit`, with the same arguments.
+    """
+
+    def __init__(
+        self, danger: DangerMonitor, delta_max: float, horizon: float = 0.2, points: int = 3, prefix: str = ""
+    ) -> None:
+        self.set_up(danger, delta_max, horizon, points, prefix)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
+        """G Δq <= h; None without points."""
+        return self.rows(configuration, dt)
+
+
+class JointLimit(BoxRows, PinkLimit):  # type: ignore[misc]
+    """qpsafe's joint limits: position, velocity and acceleration in one box that is never empty (math section 4).
+
+    As `qpsafe.plugins.mink.JointLimit`, with the same arguments.
+    """
+
+    def __init__(self, danger: DangerMonitor, prefix: str = "") -> None:
+        self.set_up(danger, prefix)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> tuple[Array, Array]:
+        """lo dt <= Δq <= hi dt as G Δq <= h."""
+        return self.rows(configuration, dt)

@@ -1,0 +1,231 @@
+"""What the plug-ins for mink and pink have in common: rows J Δq = -α e, their costs, and G Δq <= h.
+
+mink and pink ask a task for its error e and its Jacobian J and minimise ||cost (J Δq + α e)||² over the step Δq = q̇ dt
+of one tick, α in [0, 1] being the gain. qpsafe asks for J q̇ = ẋ_d + K e (CLIK). The same rows, therefore:
+
+    α = 1,  e = -(ẋ_d + K e_qpsafe) dt        or, with a reference at rest,        α = K dt,  e = -e_qpsafe
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.danger.barrier import DangerBarrier
+from qpsafe.errors import ConfigurationError
+from qpsafe.plugins.joints import JointMap
+from qpsafe.plugins.monitor import DangerMonitor
+from qpsafe.robot.robot import Robot
+from qpsafe.robot.state import RobotState
+from qpsafe.tasks.task import Task
+
+Array = NDArray[np.float64]
+
+#: m counts as at least this where a cost is divided by it: a released task keeps a millionth of the weight.
+LEAST = 1e-6
+
+
+class OnRobot:
+    """Finds the robot in the configuration it is given; the place of its joints is looked up once a model."""
+
+    robot: Robot
+    prefix: str
+    _joints: tuple[Any, JointMap] | None = None
+    _state: RobotState | None = None
+
+    def find_joints(self, model: Any) -> JointMap:
+        """The robot's joints in a model."""
+        raise NotImplementedError
+
+    def joints(self, configuration: Any) -> JointMap:
+        """The robot's joints in the model of a configuration."""
+        if self._joints is None or self._joints[0] is not configuration.model:
+            self._joints = configuration.model, self.find_joints(configuration.model)
+        return self._joints[1]
+
+    def at(self, configuration: Any) -> RobotState:
+        """The robot at a configuration, kept until the configuration changes."""
+        q = np.asarray(configuration.q)[self.joints(configuration).q]
+        if self._state is None or not np.array_equal(self._state.q, q):
+            self._state = self.robot.at(q)
+        return self._state
+
+
+class EvasiveRows(OnRobot):
+    """Δq = q̇0 dt, with a cost that grows as the tasks' release proceeds: cost² = c² + C² (1-m)/m.
+
+    Of two wishes with the weights w and w (1-m)/m the compromise is m times the first and (1-m) times the second: the
+    source's blend (18), if C is about what the tasks cost that are to be released. With C = c the cost is c/sqrt(m),
+    and a call of `solve_ik` is `WeightedLaw`, whose weights m w and w_E are divided by m.
+    """
+
+    danger: DangerMonitor
+    against: float
+    _calm_cost: Array
+
+    def set_up(self, danger: DangerMonitor, cost: ArrayLike, against: float, prefix: str) -> None:
+        """Check and keep the arguments of the constructor."""
+        if not isinstance(danger, DangerMonitor):
+            raise ConfigurationError("EvasiveTask", "danger", danger, "a DangerMonitor")
+        if not (math.isfinite(against) and against >= 0.0):
+            raise ConfigurationError("EvasiveTask", "against", against, "a finite cost >= 0")
+        self.danger, self.robot, self.prefix, self.against = danger, danger.robot, prefix, float(against)
+        self.cost = cost
+
+    @property
+    def cost(self) -> Array:
+        """Cost of every joint (n,) at present; set it to its value without danger."""
+        m = max(self.danger.m, LEAST)
+        return np.sqrt(self._calm_cost**2 + self.against**2 * (1.0 - m) / m)
+
+    @cost.setter
+    def cost(self, value: ArrayLike) -> None:
+        self._calm_cost = checked_cost("EvasiveTask", value, self.robot.nq)
+
+    def compute_error(self, configuration: Any) -> Array:
+        """-q̇0 dt, (n,) [rad]."""
+        return -updated(self.danger).qd0 * self.danger.dt
+
+    def compute_jacobian(self, configuration: Any) -> Array:
+        """Identity over the robot's joints, (n, nv)."""
+        return self.joints(configuration).spread(np.eye(self.robot.nq))
+
+
+class ClikRows(OnRobot):
+    """J Δq = (ẋ_d + K e) dt of one of qpsafe's tasks.
+
+    Attributes:
+        task: The task.
+        time: Where its trajectory is, to be set by the loop [s].
+        cost: Of every row, (rows,).
+    """
+
+    task: Task
+    cost: Array
+    dt: float
+    time: float
+
+    def set_up(self, task: Task, robot: Robot, dt: float, prefix: str) -> None:
+        """Check and keep the arguments of the constructor."""
+        misfit = task.misfit(robot)
+        if misfit is not None:
+            raise ConfigurationError(type(task).__name__, misfit.key, misfit.value, misfit.expected)
+        if not (math.isfinite(dt) and 0.0 < dt * task.gain < 1.0):
+            raise ConfigurationError(type(task).__name__, "gain", task.gain, f"K dt between 0 and 1 with dt = {dt} s")
+        self.task, self.robot, self.dt, self.prefix, self.time = task, robot, float(dt), prefix, 0.0
+
+    def compute_error(self, configuration: Any) -> Array:
+        """-(ẋ_d + K e) dt, (rows,)."""
+        sample = self.task.trajectory.sample(self.time)
+        error = self.task.error(self.task.value(self.at(configuration)), sample)
+        return -self.task.velocity(error, sample) * self.dt
+
+    def compute_jacobian(self, configuration: Any) -> Array:
+        """The task's Jacobian, (rows, nv)."""
+        return self.joints(configuration).spread(self.task.jacobian(self.at(configuration)))
+
+
+class DangerRows(OnRobot):
+    """CDF(q, q̇, p) <= Δ_max as rows G Δq <= h, for the most dangerous points (math section 2).
+
+    CDF = k1 S + k2 H(q̇), H convex and positively homogeneous: its tangent at the present velocity is exact along that
+    velocity and never above H, so (with horizon 0) no velocity that meets the cap is cut off. What a tangent lets
+    through, `guard` scales down exactly. With a horizon τ, S is predicted: S + τ ∂S/∂q q̇.
+
+    The rows never make a call fail: h is widened until standstill, and what braking within the joint limits leaves of
+    it, meet all of them. So a point whose static field alone exceeds the cap gets a row "no nearer".
+    """
+
+    danger: DangerMonitor
+    barrier: DangerBarrier
+
+    def set_up(self, danger: DangerMonitor, delta_max: float, horizon: float, points: int, prefix: str) -> None:
+        """Check and keep the arguments of the constructor."""
+        if not isinstance(danger, DangerMonitor):
+            raise ConfigurationError("DangerLimit", "danger", danger, "a DangerMonitor")
+        self.danger, self.robot, self.prefix = danger, danger.robot, prefix
+        self.barrier = DangerBarrier(delta_max, horizon, points, danger.field)
+
+    def rows(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
+        """(G, h) with G Δq <= h, or None where there are no points."""
+        danger = same_tick(updated(self.danger), dt, "DangerLimit")
+        if danger.state is None:
+            return None
+        level = self.barrier.level(danger.state, danger.qd, danger.points, danger.danger)
+        if level is None:
+            return None
+        room = np.maximum(level.upper, 0.0)
+        if danger.box is not None:
+            room = np.maximum(room, level.A @ danger.box.clip(np.zeros(self.robot.nq)))
+        return self.joints(configuration).spread(level.A), room * dt
+
+    def guard(self, configuration: Any, velocity: Array) -> Array:
+        """The velocity (nv,) scaled down so that CDF <= Δ_max exactly, wherever the static field leaves room for it.
+
+        The acceleration limits come first, if the monitor has limits: braking takes its time.
+        """
+        danger = updated(self.danger)
+        if danger.state is None or not np.isfinite(velocity).all():
+            return velocity
+        of_robot = self.joints(configuration).v
+        scaled = self.barrier.scale(danger.state, velocity[of_robot], danger.points).factor * velocity
+        if danger.box is not None:
+            scaled[of_robot] = danger.box.clip(scaled[of_robot])
+        return scaled
+
+
+class BoxRows(OnRobot):
+    """lo dt <= Δq <= hi dt with the box of `JointLimits`: position, velocity and acceleration, never contradictory."""
+
+    danger: DangerMonitor
+
+    def set_up(self, danger: DangerMonitor, prefix: str) -> None:
+        """Check and keep the arguments of the constructor."""
+        if not isinstance(danger, DangerMonitor):
+            raise ConfigurationError("JointLimit", "danger", danger, "a DangerMonitor")
+        if danger.limits is None:
+            raise ConfigurationError("JointLimit", "danger.limits", None, "a DangerMonitor with limits")
+        self.danger, self.robot, self.prefix = danger, danger.robot, prefix
+
+    def rows(self, configuration: Any, dt: float) -> tuple[Array, Array]:
+        """(G, h) with G Δq <= h, two rows a joint. Where the robot's state is not known, it may only stand still."""
+        danger = same_tick(updated(self.danger), dt, "JointLimit")
+        unit = self.joints(configuration).spread(np.eye(self.robot.nq))
+        if danger.box is None:
+            return np.vstack((unit, -unit)), np.zeros(2 * self.robot.nq)
+        return np.vstack((unit, -unit)), np.concatenate((danger.box.upper, -danger.box.lower)) * dt
+
+
+def updated(danger: DangerMonitor) -> DangerMonitor:
+    """The monitor, if it has ever been told anything: silence is not safety."""
+    if danger.ticks == 0:
+        expected = "danger.update(q, qd, points) before solve_ik, with points=[] where nothing is in sight"
+        raise ConfigurationError("DangerMonitor", "ticks", 0, expected)
+    return danger
+
+
+def same_tick(danger: DangerMonitor, dt: float, where: str) -> DangerMonitor:
+    """The monitor, if it has the tick that `solve_ik` was called with."""
+    if not math.isclose(dt, danger.dt, rel_tol=1e-9):
+        raise ConfigurationError(where, "dt", dt, f"the tick of its DangerMonitor, {danger.dt} s")
+    return danger
+
+
+def release(danger: DangerMonitor, priority: int) -> float:
+    """a_k / a_1 = f ... of the task of priority k (from 1): how much of its weight is left against the first."""
+    return math.prod(updated(danger).switches[1:priority])
+
+
+def checked_cost(where: str, cost: ArrayLike, rows: int) -> Array:
+    """A cost for every row (rows,), from one number or as many."""
+    expected = f"a finite number >= 0, or {rows} of them"
+    try:
+        array = np.array(cost, dtype=float)
+    except (TypeError, ValueError):
+        raise ConfigurationError(where, "cost", cost, expected) from None
+    if array.shape not in ((), (1,), (rows,)) or not (np.isfinite(array).all() and (array >= 0.0).all()):
+        raise ConfigurationError(where, "cost", cost, expected)
+    return np.broadcast_to(array, rows).copy()
