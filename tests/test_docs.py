@@ -22,7 +22,7 @@ PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
 ALL = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: Examples that take an argument to be shorter.
-ARGUMENTS = {"compare_to_nullspace.py": ["180"]}
+ARGUMENTS = {"compare_to_nullspace.py": ["180"], "mink_evasion.py": ["--steps", "500"]}
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")

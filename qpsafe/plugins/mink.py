@@ -85,7 +85,7 @@ class ReleasableTask(mink.tasks.BaseTask):  # type: ignore[misc]
     """
 
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
-        count = len(danger.activation.thresholds)
+        count = len(danger.activation.levels)
         if not 1 <= priority <= count:
             raise ConfigurationError("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold")
         self.task, self.danger, self.priority = task, danger, priority

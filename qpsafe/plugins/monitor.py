@@ -12,6 +12,7 @@ from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
+from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits
 from qpsafe.robot.robot import Robot
@@ -32,7 +33,7 @@ class DangerMonitor:
         robot: The robot whose wire makes the field.
         dt: Tick [s], the same as given to `solve_ik`.
         field: The danger field; the source's weights by default.
-        activation: Thresholds, the highest priority's first; the source's for two tasks by default.
+        activation: Thresholds, the highest priority's first; the robot's two by default.
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; None for none.
         ramp: A task that danger released comes back within this time at the earliest, and is released within a tenth
@@ -47,7 +48,7 @@ class DangerMonitor:
         cdf_n: Largest of them, 0 without points; NaN where the input was bad.
         switches: (m, f, ...) of eqs. (19), (21), smoothed by `ramp`; all 0 where the input was bad: the robot brakes.
         qd0: Evasive velocity (n,) [rad/s].
-        box: Joint velocities that the limits admit, None without limits or a usable measurement.
+        box: Joint velocities that the limits admit, after bad input only braking; None without limits.
         status: ``"ok"`` or ``"bad input"``.
         message: What was wrong with the input, else empty.
 
@@ -76,7 +77,7 @@ class DangerMonitor:
         check_parts(robot, dt, field, activation, evasion, limits)
         self.robot, self.dt = robot, float(dt)
         self.field = DangerField() if field is None else field
-        self.activation = Activation() if activation is None else activation
+        self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
         self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
         own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
         self.limits = own if isinstance(limits, str) else limits
@@ -88,7 +89,7 @@ class DangerMonitor:
         """Forget the past: no points, no evasive velocity."""
         self.evasion.reset()
         self.ticks = 0
-        self.box: Box | None = None
+        self._moving = np.zeros(self.robot.nq)
         self._bad("not updated yet")
         self.status, self.message = OK, ""
         self._last = (1.0,) * len(self.switches)
@@ -122,12 +123,12 @@ class DangerMonitor:
         seen = as_detection(state, wire, None, None, points)
         danger, gradient = self.field.evaluate(seen.points, wire)  # (5)
         vectors = danger_vectors(danger, gradient)  # (6)
-        torque = virtual_torque(
-            state, link_vectors(vectors, seen.links, len(self.robot.wire_frames))
-        )  # (8), (14), (15)
+        forces = link_vectors(vectors, seen.links, len(self.robot.wire_frames))  # (8)
+        torque = virtual_torque(state, forces)  # (14), (15)
         if not (np.isfinite(danger).all() and np.isfinite(torque).all()):
             raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
         self.state: RobotState | None = state
+        self._moving = qd
         self.qd, self.points, self.danger = qd, seen.points, danger
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
@@ -152,8 +153,13 @@ class DangerMonitor:
         n = self.robot.nq
         self.state, self.qd, self.qd0 = None, np.zeros(n), np.zeros(n)
         self.points, self.danger, self.cdf_n = np.empty((0, 3)), np.empty(0), math.nan
-        self.switches = self._last = (0.0,) * len(self.activation.thresholds)
-        self.box = None
+        self.switches = self._last = (0.0,) * len(self.activation.levels)
+        if self.limits is not None:  # brake from the last speed that is known; whoever kept to the box can
+            most = self.limits.max_acceleration * self.dt
+            self._moving = self._moving - np.clip(self._moving, -most, most)
+        no_kind = np.zeros(n, dtype=np.int64)
+        pinned = Box(self._moving.copy(), self._moving.copy(), no_kind, no_kind, no_kind)
+        self.box: Box | None = None if self.limits is None else pinned
         self.status, self.message = BAD_INPUT, message
 
 

@@ -69,7 +69,7 @@ class ReleasableTask(PinkTask):  # type: ignore[misc]
     """
 
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
-        count = len(danger.activation.thresholds)
+        count = len(danger.activation.levels)
         if not 1 <= priority <= count:
             raise ConfigurationError("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold")
         super().__init__(cost=task.cost, gain=task.gain, lm_damping=task.lm_damping)

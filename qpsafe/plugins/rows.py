@@ -191,11 +191,10 @@ class BoxRows(OnRobot):
         self.danger, self.robot, self.prefix = danger, danger.robot, prefix
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array]:
-        """(G, h) with G Δq <= h, two rows a joint. Where the robot's state is not known, it may only stand still."""
+        """(G, h) with G Δq <= h, two rows a joint."""
         danger = same_tick(updated(self.danger), dt, "JointLimit")
         unit = self.joints(configuration).spread(np.eye(self.robot.nq))
-        if danger.box is None:
-            return np.vstack((unit, -unit)), np.zeros(2 * self.robot.nq)
+        assert danger.box is not None  # since it has limits
         return np.vstack((unit, -unit)), np.concatenate((danger.box.upper, -danger.box.lower)) * dt
 
 

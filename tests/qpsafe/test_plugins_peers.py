@@ -138,7 +138,7 @@ def near(robot, q, gap):
 
 
 def watch(robot, q, points, qd=None):
-    danger = DangerMonitor(robot, DT)
+    danger = DangerMonitor(robot, DT, ramp=0.0, limits=None)
     for _ in range(40):
         danger.update(q, np.zeros(6) if qd is None else qd, points)
     return danger
@@ -211,7 +211,7 @@ def test_in_danger_tasks_are_released_as_the_weighted_law_releases_them(engine, 
 def test_the_monitor_sees_what_the_controller_sees(robot):
     goal = qpsafe.FixedPose(robot.pose("tcp", robot.home))
     controller = qpsafe.SafetyController(robot, [qpsafe.PositionTask("tcp", goal), qpsafe.OrientationTask("tcp", goal)])
-    danger = DangerMonitor(robot, controller.dt)
+    danger = DangerMonitor(robot, controller.dt, ramp=0.0)
     q, qd = robot.home, np.zeros(6)
     for k in range(50):
         points = [near(robot, robot.home, 0.6 - 0.005 * k), [0.3, -0.5, 0.6]]
@@ -303,6 +303,44 @@ def test_a_point_that_is_too_near_already_makes_no_call_fail(engine, robot):
         assert np.all(rows[0] @ (qd * DT) <= rows[1] + 1e-9)
 
 
+def test_within_the_joint_limits_no_call_fails_whatever_the_danger(engine, robot):
+    """Wild targets, points that jump onto the robot: each tick is solved, and inside the box."""
+    rng = np.random.default_rng(6)
+    danger, q, qd = DangerMonitor(robot, DT), np.array(robot.home), np.zeros(6)
+    limits = [engine.plugin.JointLimit(danger), engine.plugin.DangerLimit(danger, delta_max=8.0)]
+    evasive, configuration, point = engine.plugin.EvasiveTask(danger), engine.at(q), np.ones(3)
+    for k in range(400):
+        if k % 40 == 0:
+            hold = engine.frame(robot.pose("tcp", rng.uniform(robot.lower, robot.upper)), 1.0, 0.3, gain=0.2)
+            point = near(robot, q, rng.uniform(0.0, 0.8))
+        danger.update(q, qd, [point])
+        last, qd = qd, engine.solve(configuration, [hold, evasive, engine.posture(q, 1e-3, 0.1)], limits)
+        assert np.all(qd >= danger.box.lower - 1e-6)
+        assert np.all(qd <= danger.box.upper + 1e-6)
+        assert np.all(np.abs(qd - last) <= robot.max_acceleration * DT + 1e-6)
+        q = q + qd * DT
+        configuration.update(q)
+    assert np.all(q >= robot.lower - 1e-6)
+    assert np.all(q <= robot.upper + 1e-6)
+
+
+def test_a_task_comes_back_no_sooner_than_the_ramp_and_is_released_within_a_tenth_of_it(robot):
+    danger, here = DangerMonitor(robot, DT, ramp=0.5), near(robot, robot.home, 0.2)
+    danger.update(robot.home, np.zeros(6), [])
+    assert danger.switches == (1.0, 1.0)
+    for _ in range(round(0.05 / DT)):
+        danger.update(robot.home, np.zeros(6), [here])
+    assert max(danger.switches) < 0.15
+    for _ in range(500):
+        danger.update(robot.home, np.zeros(6), [here])
+    assert danger.m < 1e-9
+    ticks = 0
+    while danger.m < 1.0:
+        danger.update(robot.home, np.zeros(6), [])
+        ticks += 1
+    assert ticks == pytest.approx(0.5 / DT, abs=1)
+
+
 @pytest.mark.parametrize("bad", ["points", "q", "shape"])
 def test_bad_data_are_reported_and_brake(engine, robot, bad):
     danger = watch(robot, robot.home, [near(robot, robot.home, 0.3)])
@@ -325,6 +363,22 @@ def test_bad_data_are_reported_and_brake(engine, robot, bad):
     assert (danger.status, danger.message) == ("ok", "")
 
 
+def test_after_bad_data_the_joint_limit_brakes_within_the_accelerations(engine, robot):
+    danger, q = DangerMonitor(robot, DT), np.array(robot.home)
+    qd = 0.5 * np.ones(6)
+    limit, configuration = engine.plugin.JointLimit(danger), engine.at(q)
+    hold = engine.frame(robot.pose("tcp", robot.home + 0.4), 1.0, 1.0, gain=0.5)
+    danger.update(q, qd, [])
+    qd = engine.solve(configuration, [hold], [limit])
+    danger.update(q, qd, [])
+    for _ in range(60):
+        danger.update(q, np.full(6, np.nan), [])
+        last, qd = qd, engine.solve(configuration, [hold], [limit])
+        assert np.all(np.abs(qd) <= np.abs(last) + 1e-6)
+        assert np.all(np.abs(qd - last) <= robot.max_acceleration * DT + 1e-6)
+    np.testing.assert_allclose(qd, 0.0, atol=1e-6)
+
+
 def test_mistakes_are_named(engine, robot):
     danger = DangerMonitor(robot, DT)
     plugin, home = engine.plugin, engine.at(robot.home)
@@ -345,6 +399,9 @@ def test_mistakes_are_named(engine, robot):
         (lambda: plugin.ClikTask(qpsafe.PositionTask("hand", goal), robot, DT), "frame"),
         (lambda: plugin.ClikTask(qpsafe.PositionTask("tcp", goal, gain=300.0), robot, DT), "gain"),
         (lambda: DangerMonitor(robot, 0.0), "dt"),
+        (lambda: DangerMonitor(robot, ramp=-1.0), "ramp"),
+        (lambda: DangerMonitor(robot, base=np.eye(3)), "base"),
+        (lambda: plugin.JointLimit(DangerMonitor(robot, limits=None)), "limits"),
         (lambda: DangerMonitor(robot, evasion=qpsafe.Evasion(1.0, 1.0, 7)), "evasion"),
         (lambda: qpsafe.WeightedLaw(weights=(1.0, 0.0)), "weights"),
     ):
@@ -391,16 +448,30 @@ def test_outside_a_joint_limit_solve_ik_raises_and_qpsafe_comes_back(engine, rob
             assert isinstance(engine, Pink)
         except engine.no_solution:
             raised += 1
-        controller = qpsafe.SafetyController(robot, [qpsafe.PostureTask(q)])
-        qd, speeds = np.zeros(6), []
+        start = q.copy()
+        controller, qd, speeds = qpsafe.SafetyController(robot, [qpsafe.PostureTask(start)]), np.zeros(6), []
         for _ in range(200):
             tick = controller.step(q, qd, points=[])
             q, qd = tick.reference.q, tick.reference.qd
             speeds.append(qd[joint])
-        assert q[joint] <= robot.upper[joint] + 1e-9
-        assert min(speeds) >= -controller.limits.return_speed - 1e-9
-        assert abs(q[joint] - robot.upper[joint]) < 1e-3  # and goes no farther than it has to
+        back_inside(robot, joint, q, speeds)
+        danger, q, qd, speeds = DangerMonitor(robot, DT), start.copy(), np.zeros(6), []  # JointLimit in their call
+        configuration, limit = engine.at(q), engine.plugin.JointLimit(danger)
+        for _ in range(200):
+            danger.update(q, qd, [])
+            qd = engine.solve(configuration, [hold], [limit])
+            q = q + qd * DT
+            configuration.update(q)
+            speeds.append(qd[joint])
+        back_inside(robot, joint, q, speeds)
     assert raised >= (6 if type(engine) is Mink else 3)
+
+
+def back_inside(robot, joint, q, speeds):
+    """Inside, at a bounded speed, and no farther than necessary."""
+    assert robot.upper[joint] - 1e-3 < q[joint] <= robot.upper[joint] + 1e-7
+    assert min(speeds) >= -0.1 - 1e-6
+    assert np.all(np.abs(np.diff([0.0, *speeds])) <= robot.max_acceleration[joint] * DT + 1e-6)
 
 
 def test_pink_is_optional():
