@@ -133,7 +133,7 @@ class DangerMonitor:
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
         self.qd0 = self.evasion.step(torque).copy()  # (16)
-        self.box = None if self.limits is None else self.limits.box(q, qd)
+        self.box: Box | None = None if self.limits is None else self.limits.box(q, qd)
         self.status, self.message = OK, ""
 
     def _ramped(self, switches: tuple[float, ...]) -> tuple[float, ...]:
@@ -159,7 +159,7 @@ class DangerMonitor:
             self._moving = self._moving - np.clip(self._moving, -most, most)
         no_kind = np.zeros(n, dtype=np.int64)
         pinned = Box(self._moving.copy(), self._moving.copy(), no_kind, no_kind, no_kind)
-        self.box: Box | None = None if self.limits is None else pinned
+        self.box = None if self.limits is None else pinned
         self.status, self.message = BAD_INPUT, message
 
 
