@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.inbox import Arrival, Inbox, Sender
-from qpsafe.irc5.messages import RobotPacket, SensorPacket, encode_sensor
+from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
 from qpsafe.limits import JointLimits
@@ -108,7 +108,8 @@ class EgmSession:
         self._anew, self._missed = False, 0
         self._cycle: Cycle | None = None
         self._before: RobotPacket | None = None
-        self._source: JointReference | None = None
+        self._source: JointReference | None = None  # the last one that was followed,
+        self._ticks = 1  # and for how many ticks it has been the last one
         self._rest: Array | None = None
         self._seq, self._now = 0, 0.0
         self._relax = False
@@ -182,6 +183,7 @@ class EgmSession:
             self.phase = Phase.STOPPED if stopped else Phase.HOLDING if closed else Phase.RAMPING
             notes += closed + (["the robot started anew"] if arrival.restarted else [])
         else:
+            self._ticks += missed
             if missed:  # it went on at the last speed for as long as nothing else arrived
                 self._remember(self.q + self.qd * min(missed * self.limits.dt, self.rules.lag))
             low, high = self._recent.min(axis=0), self._recent.max(axis=0)
@@ -211,6 +213,7 @@ class EgmSession:
         elif self.phase == Phase.STOPPED and self._rest is not None:
             self._shaper.settle(self._rest)
         self._remember(self.q)
+        self._ticks += 1
         data = encode_sensor(SensorPacket(self._seq, int(self._now * 1e3), self.q, self.qd))
         self._seq += 1
         self.counts["answered"] += 1
@@ -226,7 +229,7 @@ class EgmSession:
         if jump:
             self.stop(jump)
             return
-        self._source = usable
+        self._source, self._ticks = usable, 0
         self._shaper.follow(usable.q, usable.qd)
         self.counts["clipped"] += self._shaper.clipped
         if self._shaper.weight >= 1.0:
@@ -235,7 +238,8 @@ class EgmSession:
     def _seed(self, q: Array) -> None:
         self._shaper.seed(q)
         self._recent[:] = q
-        self._source, self._relax, self._rest = None, False, None
+        self._source, self._ticks = None, 1
+        self._relax, self._rest = False, None
 
     def _remember(self, q: Array) -> None:
         self._recent[:-1] = self._recent[1:]
@@ -251,9 +255,8 @@ class EgmSession:
     def _jump(self, reference: JointReference) -> str:
         """What the source did that no source within the limits does, in words."""
         last, start = self._source, self._shaper.q
-        ticks = 1 if last is None else max(1, min(reference.seq - last.seq, self.rules.most_missed))
         moved = np.abs(reference.q - (start if last is None else last.q))
-        excess = moved - self.limits.max_velocity * self.limits.dt * ticks
+        excess = moved - self.limits.max_velocity * self.limits.dt * self._ticks
         worst = int(np.argmax(excess))
         if excess[worst] <= self.rules.jump:
             return ""
@@ -261,14 +264,13 @@ class EgmSession:
         return f"the reference of {self.names[worst]} is {moved[worst]:.3g} rad from {place}"
 
     def _velocity(self, packet: RobotPacket) -> Array:
-        """By differences over the robot's own clock; 0 where that makes no sense."""
+        """By differences over the robot's own clock, or over the number of its packets where that clock jumps."""
         before = self._before
         if before is None or before.clock is None or packet.clock is None:
             return np.zeros(self.n)
+        counted = (packet.seq - before.seq) % WRAP * self.limits.dt
         elapsed = packet.clock - before.clock
-        if not 0.5 * self.limits.dt <= elapsed <= 1.0:
-            return np.zeros(self.n)
-        return (packet.q - before.q) / elapsed
+        return (packet.q - before.q) / (elapsed if 0.5 * counted <= elapsed <= 2.0 * counted else counted)
 
     def _closed(self, packet: RobotPacket) -> list[str]:
         """What keeps the robot from being driven, in words."""
