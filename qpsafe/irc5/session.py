@@ -112,7 +112,7 @@ class EgmSession:
         self._ticks = 1  # and for how many ticks it has been the last one
         self._rest: Array | None = None
         self._seq, self._now = 0, 0.0
-        self._relax = False
+        self._relax = self._released = False
 
     @property
     def q(self) -> Array:
@@ -150,6 +150,7 @@ class EgmSession:
 
     def stop(self, cause: str) -> None:
         """Bring the robot to rest, and hold it until `acknowledge`."""
+        self._released = False
         if cause not in self.causes:
             self.causes = (*self.causes, cause)
         if self.phase in (Phase.RAMPING, Phase.RUNNING):
@@ -157,10 +158,16 @@ class EgmSession:
         elif self.phase != Phase.STOPPING:
             self.phase = Phase.STOPPED
 
-    def acknowledge(self) -> None:
-        """A person has seen to the cause of the stop: from the next packet on, references are ramped in again."""
-        if self.phase == Phase.STOPPED:
-            self.phase, self.causes = Phase.HOLDING, ()
+    def acknowledge(self) -> bool:
+        """A person has seen to the cause of the stop: once the robot is at rest, references are ramped in again.
+
+        Returns:
+            Whether there was anything to acknowledge: False before it is stopped.
+        """
+        if self.phase != Phase.STOPPED:
+            return False
+        self.causes, self._released = (), True
+        return True
 
     def take(self) -> Cycle | None:
         """The cycle of the newest packet, once; None if none has arrived."""
@@ -175,6 +182,8 @@ class EgmSession:
         notes = [f"{missed} packets missed"] if missed else []
 
         closed = self._closed(packet)
+        if self._released and not self.qd.any():
+            self.phase, self._released = Phase.HOLDING, False
         seeded = anew or self.phase in (Phase.WAITING, Phase.HOLDING)
         deviation = np.zeros(self.n)
         if seeded:

@@ -78,7 +78,7 @@ class Shaper:
         """Speed to make up for a distance that can still be braked by half the acceleration."""
         speed = np.zeros_like(distance)
         for i, s in enumerate(distance.tolist()):
-            if s != 0.0:
+            if abs(s) > 1e-12:  # else it is there, but for rounding
                 fastest = stopping_speed(abs(s), 0.5 * self.limits.max_acceleration[i], self.dt)
                 speed[i] = math.copysign(min(fastest, self._most[i]), s)
         return speed

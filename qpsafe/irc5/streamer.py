@@ -121,9 +121,9 @@ class EgmStreamer:
         """Bring the robot to rest over the next answers, and hold it until `acknowledge`."""
         self.session.stop(cause)
 
-    def acknowledge(self) -> None:
-        """A person has seen to the cause of the stop."""
-        self.session.acknowledge()
+    def acknowledge(self) -> bool:
+        """A person has seen to the cause of the stop. Returns False before the robot is stopped."""
+        return self.session.acknowledge()
 
     def finish(self, patience: float = 0.2) -> bool:
         """Answer until the robot is at rest: to fall silent before would leave it at its last speed.

@@ -141,6 +141,7 @@ def test_blending_is_the_weighted_mean_of_seed_and_source(wire: Wire) -> None:
         s = k / ticks
         w = s * s * (3.0 - 2.0 * s)
         assert np.allclose(wire.answers[-1].q_ref, START + w * (wire.source.q - START), rtol=0, atol=1e-9)
+        assert (wire.session.phase == Phase.RUNNING) == (k == ticks)
 
 
 def test_every_packet_is_answered_exactly_once(wire: Wire) -> None:
@@ -234,17 +235,17 @@ def test_braking_keeps_the_direction(wire: Wire) -> None:
 
 def test_only_an_acknowledgement_ends_a_stop(wire: Wire) -> None:
     wire.run()
-    wire.session.acknowledge()  # nothing to acknowledge
+    assert not wire.session.acknowledge()  # nothing to acknowledge
     assert wire.session.phase == Phase.RUNNING
     wire.session.stop("why")
-    wire.session.acknowledge()  # not before it stands
+    assert not wire.session.acknowledge()  # not before it stands
     wire.exchange(300)
     assert (wire.session.phase, wire.session.causes) == (Phase.STOPPED, ("why",))
     for states in ({"motors_on": False}, {}):
         wire.states = states
         wire.exchange(3)
         assert wire.session.phase == Phase.STOPPED
-    wire.session.acknowledge()
+    assert wire.session.acknowledge()
     wire.exchange()
     assert wire.cycles[-1].seeded
     assert (wire.session.phase, wire.session.causes) == (Phase.RAMPING, ())
@@ -567,6 +568,62 @@ def test_a_robot_that_does_not_follow_is_stopped_and_not_pushed(wire: Wire) -> N
     wire.check_steps(since - 1)
     worst = max(cycle.deviation.max() for cycle in wire.cycles if cycle.phase == Phase.RUNNING)
     assert worst <= SessionRules().deviation
+
+
+def test_what_was_sent_before_a_new_start_is_no_excuse(wire: Wire) -> None:
+    wire.run()
+    wire.seq, wire.q = -1, np.full(N, 1.5)
+    wire.exchange(2)
+    wire.q = np.full(N, 1.3)  # towards where it was
+    wire.exchange()
+    assert wire.session.phase == Phase.STOPPING
+
+
+def test_a_robot_that_ran_on_while_packets_were_missing_is_no_deviation(wire: Wire) -> None:
+    wire.run()
+    wire.exchange(50, None)
+    q, speed = wire.answers[-1].q_ref, np.zeros(N)
+    for k in range(40):
+        speed = np.array([0.0, 0.0, 0.07 * (k + 1)])
+        q = q - speed * DT
+        wire.exchange(1, JointReference(k, 0.0, q, -speed))
+    for missed, phase in ((20, Phase.RUNNING), (60, Phase.STOPPING)):  # within the lag, and far beyond
+        wire.q = wire.session.q + wire.session.qd * missed * DT
+        assert np.abs(wire.q - wire.session.q).max() > 2 * SessionRules().deviation
+        wire.pass_time(missed + 1)
+        wire.offer(wire.packet())
+        q = q - speed * DT
+        wire.answer(JointReference(0, 0.0, q, -speed))
+        assert wire.session.phase == phase
+
+
+def test_an_acknowledgement_waits_until_the_robot_stands(wire: Wire) -> None:
+    """Acknowledged while the reference still gives way to a robot that is held: no jump, but a new start after that."""
+    wire.run()
+    stuck = wire.q.copy()
+    since, count = len(wire.answers), 0
+    for _ in range(400):
+        wire.q = stuck.copy()
+        wire.exchange(1, None if count else "source")
+        if wire.session.phase == Phase.STOPPED and wire.answers[-1].qd_ref.any() and wire.session.acknowledge():
+            count += 1
+            assert wire.session.causes == ()
+        if wire.cycles[-1].seeded:
+            break
+    assert count > 0
+    assert wire.session.phase == Phase.RAMPING
+    assert not wire.answers[-2].qd_ref.any()
+    wire.check_steps(since - 1)
+
+
+def test_a_stop_after_an_acknowledgement_holds(wire: Wire) -> None:
+    wire.run()
+    wire.session.stop("one")
+    wire.exchange(300)
+    assert wire.session.acknowledge()
+    wire.session.stop("two")
+    wire.exchange(10)
+    assert (wire.session.phase, wire.session.causes) == (Phase.STOPPED, ("two",))
 
 
 def test_a_robot_that_lags_as_robots_do_is_no_deviation(wire: Wire) -> None:
