@@ -70,7 +70,8 @@ def main() -> None:
     for damping in (2.0, 20.0):
         log = run(damping)
         print(
-            f"damping {damping:g}: elbow {log['rest'][-1]:.3f} m from the person at rest, {log['elbow'][-1]:.3f} m at the end; "
+            f"damping {damping:g}: elbow {log['rest'][-1]:.3f} m from the person at rest, "
+            f"{log['elbow'][-1]:.3f} m at the end; "
             f"tool off by at most {1e3 * log['position'].max():.4f} mm and {log['orientation'].max():.1e} rad; "
             f"danger {log['cdf_n'].max():.2f} to {log['cdf_n'][-1]:.2f}"
         )
