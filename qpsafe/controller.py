@@ -105,6 +105,16 @@ class SafetyController:
         self._q = self.robot.home.copy()
         self._qd, self._qdd = np.zeros(self.robot.nq), np.zeros(self.robot.nq)
 
+    def reseed(self) -> None:
+        """Something else has moved or stopped the robot: the next valid measurement sets the commanded configuration.
+
+        The path's clock stays, and the robot is led back to its path as after a suspension.
+        """
+        self.evasion.reset()
+        self.recovery.set_tasks(self.tasks, self.activation.suspend_above, restart=False)
+        self._active = False
+        self._qd, self._qdd = np.zeros(self.robot.nq), np.zeros(self.robot.nq)
+
     def acknowledge(self) -> None:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
         if self.sensing is not None:

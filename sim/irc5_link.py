@@ -52,6 +52,10 @@ class Wire:
         self.cycle = 0
         self.lost = self.duplicated = self.reordered = self.junk = 0
 
+    def draw_anew(self, rng: np.random.Generator) -> None:
+        """Draw from another generator from now on."""
+        self._rng = rng
+
     def put(self, datagram: bytes) -> None:
         """Send one."""
         faults, draw = self.faults, self._rng.random

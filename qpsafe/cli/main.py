@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from qpsafe import __version__
-from qpsafe.cli import bench, calibrate, compare, demo, robots, sick_sensors
+from qpsafe.cli import bench, calibrate, compare, demo, irc5_faults, irc5_sim, robots, sick_sensors, stream
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(
@@ -24,6 +24,9 @@ app.command("robots")(robots.robots)
 app.command("bench")(bench.bench)
 app.command("calibrate")(calibrate.calibrate)
 app.command("sick-sensors")(sick_sensors.sick_sensors)
+app.command("stream")(stream.stream)
+app.command("irc5-sim")(irc5_sim.irc5_sim)
+app.command("irc5-faults")(irc5_faults.irc5_faults)
 
 
 def _version(value: bool) -> None:

@@ -1,0 +1,80 @@
+"""`qpsafe irc5-faults`: every fault of an IRC5 and its wire, at random moments."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.irc5_matrix import Result
+
+
+def irc5_faults(
+    moments: Annotated[int, typer.Option(min=1, max=500, help="Random moments of a moving robot.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the moments and of the wire.")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
+) -> None:
+    """Inject loss, delay, restarts, motors off, strangers, junk ... in simulated time; print the matrix of reactions.
+
+    Exit code 1 if a reaction is missing or late, a reference passes a limit, or an exception escapes.
+    """
+    screen = console(json)
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.irc5_matrix import run_faults
+
+    with progress_bar(screen) as progress:
+        task = progress.add_task(f"{moments} moments", total=moments)
+        results = run_faults(
+            load_robot("irb140"),
+            moments,
+            seed,
+            jobs=jobs,
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    good = all(result.kept for result in results)
+    if json:
+        print_json({"good": good, "cases": [result._asdict() | {"kept": result.kept} for result in results]})
+    else:
+        show(results, screen)
+    if not good:
+        raise typer.Exit(1)
+
+
+def show(results: list[Result], screen: Console) -> None:
+    """Print the matrix."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(
+        title="Faults of the robot and its wire, each at every moment", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    for heading in ("", "fault and promised reaction"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("seen", "ticks", "speed", "accel.", "seed", "errors"):
+        table.add_column(heading, justify="right")
+    for r in results:
+        table.add_row(
+            "[green]kept[/]" if r.kept else "[red]NOT[/]",
+            f"{r.case}\n  [dim]{r.promise}[/]",
+            f"{r.seen}/{r.moments}",
+            f"{r.slowest}/{r.within}",
+            f"{r.step:.3f}",
+            f"{r.change:.3f}",
+            "exact" if r.seed <= 1e-9 else f"{r.seed:.1e}",
+            str(len(r.errors) + r.unpaired),
+        )
+    screen.print(table)
+    screen.print(
+        "seen: moments in which the reaction came; ticks of 4 ms: slowest, and how many are promised; speed, accel.: "
+        "of the reference, largest of what the joint can do; seed: distance from the measured pose of a reference that "
+        "starts there; errors: exceptions, and positions that do not go with their speed",
+        style="dim",
+        highlight=False,
+    )

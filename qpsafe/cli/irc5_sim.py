@@ -1,0 +1,172 @@
+"""`qpsafe irc5-sim`: a simulated IRC5 at the other end of the wire."""
+
+from __future__ import annotations
+
+import json as json_module
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import SensorName, console, print_json, write_text
+from qpsafe.cli.stream import Experiment
+from qpsafe.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.irc5_process import RobotRun
+
+
+def irc5_sim(
+    experiment: Annotated[Experiment, typer.Option(help="What is played around the robot.")] = Experiment.fixed,
+    robot: Annotated[str, typer.Option(help="A bundled name, or a path to a robot folder.")] = "irb140",
+    host: Annotated[str, typer.Option(help="Where qpsafe stream listens.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 6510,
+    sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Where distances go; 0: nowhere.")] = 6511,
+    event_port: Annotated[int, typer.Option(min=0, max=65535, help="Where names of events arrive; 0: any.")] = 6512,
+    sensor: Annotated[SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")] = (
+        SensorName.ideal
+    ),
+    duration: Annotated[
+        float | None, typer.Option(min=0.1, help="From the first answer; the experiment's own [s].")
+    ] = (None),
+    seed: Annotated[int, typer.Option(min=0, help="Varies people and faults; 0 is nominal.")] = 0,
+    lockstep: Annotated[bool, typer.Option("--lock-step", help="Wait for every answer: same run every time.")] = False,
+    gain: Annotated[float, typer.Option(min=0.0, max=20.0, help="k of the motion law [1/s].")] = 5.0,
+    lowpass: Annotated[float, typer.Option(min=0.0, max=100.0, help="LpFilter [Hz]; 0: none.")] = 20.0,
+    max_speed_deviation: Annotated[float, typer.Option(min=0.1, help="MaxSpeedDeviation [deg/s].")] = 450.0,
+    comm_timeout: Annotated[float, typer.Option(min=0.004, help="CommTimeout [s].")] = 1.0,
+    cond_time: Annotated[float, typer.Option(min=0.004, help="CondTime [s]; by default never over.")] = math.inf,
+    robot_ramp_in: Annotated[float, typer.Option(min=0.0, help="RampInTime [s].")] = 0.05,
+    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Control lag [s].")] = 0.012,
+    retry: Annotated[float, typer.Option(min=0.0, help="RAPID starts EGM anew this long after a time-out [s].")] = 1.0,
+    loss: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of datagrams lost, each way.")] = 0.0,
+    delay: Annotated[float, typer.Option(min=0.0, max=10.0, help="Delay, each way, in whole cycles [s].")] = 0.0,
+    reorder: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that comes after the next.")] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that comes twice.")] = 0.0,
+    garbage: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share followed by junk.")] = 0.0,
+    wrong_sender: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of cycles with a stranger.")] = 0.0,
+    faulty: Annotated[str, typer.Option(metavar="START:LENGTH", help="When the wire is bad [s].")] = "0:inf",
+    restart: Annotated[list[float] | None, typer.Option(help="RAPID starts anew at this time [s]; repeat it.")] = None,
+    motors_off: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="Motors off [s].")] = None,
+    rapid_stop: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="RAPID stopped [s].")] = None,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Ask for SCHED_FIFO, for cycles on time.")] = False,
+    log: Annotated[Path | None, typer.Option(help="CSV of measured and referenced joint positions.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write what was seen as JSON to standard output.")] = False,
+) -> None:
+    """Simulate an IRC5 under EGM that drives the MuJoCo plant, for qpsafe stream in another process.
+
+    Faults are counted from the first answer. Distances of the simulated spots are sent along.
+    """
+    screen = console(json)
+    screen.print("Loading ...", style="dim")
+    from qpsafe.irc5 import realtime
+
+    realtime.one_thread()
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.experiments import experiment_loop
+    from qpsafe.sim.irc5_link import WireFaults
+    from qpsafe.sim.irc5_loop import Irc5Loop
+    from qpsafe.sim.irc5_motion import EgmSettings
+    from qpsafe.sim.irc5_process import happenings, run_robot
+    from qpsafe.sim.irc5_udp import UdpExchange
+
+    settings = EgmSettings(
+        gain=gain,
+        lowpass=lowpass,
+        max_speed_deviation=math.radians(max_speed_deviation),
+        comm_timeout=comm_timeout,
+        cond_time=cond_time,
+        ramp_in=robot_ramp_in,
+        lag=lag,
+        retry=retry,
+    )
+    faults = WireFaults(loss, delay, reorder, duplicate, garbage)
+    todo = happenings(
+        restart or [],
+        [span("--motors-off", text) for text in motors_off or ()],
+        [span("--rapid-stop", text) for text in rapid_stop or ()],
+        faults,
+        span("--faulty", faulty),
+        wrong_sender,
+    )
+    if lockstep and todo:
+        raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
+    found = load_robot(robot)
+    loop, length = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
+    length = length if duration is None else duration
+    exchange = UdpExchange(
+        found.nq,
+        (host, port),
+        (host, sensor_port) if sensor_port else None,
+        event_port=event_port,
+        seed=seed,
+        lockstep=1.0 if lockstep else 0.0,
+    )
+    run = Irc5Loop(loop, exchange, settings)
+    if real_time:
+        screen.print(realtime.fifo(70).line, style="dim", highlight=False)
+    realtime.fine_timers()
+    realtime.freeze_garbage()
+    screen.print(f"sending to {host}:{port}; Ctrl-C ends", highlight=False)
+    try:
+        result = run_robot(
+            run,
+            exchange,
+            length,
+            lockstep=lockstep,
+            keep=log is not None,
+            todo=todo,
+            progress=status if sys.stderr.isatty() and not json else None,
+        )
+    finally:
+        exchange.close()
+    if log is not None:
+        write_text(log, table(result, found.joint_names))
+    if json:
+        print_json(result.to_dict())
+    else:
+        show(result, screen)
+    if result.counts["answered"] == 0:
+        raise typer.Exit(1)
+
+
+def span(option: str, text: str) -> tuple[float, float]:
+    """Start and length from "START:LENGTH" [s]."""
+    start, _, length = text.partition(":")
+    try:
+        found = float(start), float(length)
+    except ValueError:
+        found = math.nan, math.nan
+    if not (found[0] >= 0.0 and found[1] >= 0.0):
+        raise ConfigurationError("qpsafe irc5-sim", option, text, "START:LENGTH in seconds, e.g. 5:0.5")
+    return found
+
+
+def status(run: RobotRun) -> None:
+    """Overwrite the status line, twice a second."""
+    if run.cycles % 125 == 0:
+        sys.stderr.write(f"\r{0.004 * run.cycles:8.1f} s  {run.cycles} cycles, {run.late} of them late ")
+        sys.stderr.flush()
+
+
+def table(run: RobotRun, names: tuple[str, ...]) -> str:
+    """Measured positions and references, a row a cycle, as CSV."""
+    header = ["time [s]", *(f"q {name} [rad]" for name in names), *(f"q_ref {name} [rad]" for name in names)]
+    rows = [
+        ",".join(format(value, ".17g") for value in (0.004 * k, *q, *q_ref))
+        for k, (q, q_ref) in enumerate(zip(run.q, run.reference, strict=True))
+    ]
+    return "\n".join([",".join(header), *rows]) + "\n"
+
+
+def show(run: RobotRun, screen: Console) -> None:
+    """Print what the robot's end saw."""
+    counts: dict[str, Any] = run.counts
+    screen.print()
+    screen.print(f"{run.cycles} cycles, {run.late} of them more than 4 ms late themselves", highlight=False)
+    screen.print(json_module.dumps(counts | {"rejected": run.rejected}), highlight=False)
+    screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s", highlight=False)

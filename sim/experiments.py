@@ -1,0 +1,30 @@
+"""The experiments by name, as loops that can be run here or over the wire."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.loop import FixedLoop
+from qpsafe.sim.path import PathExperiment
+
+if TYPE_CHECKING:
+    from qpsafe.laws.problem import Law
+    from qpsafe.robot.robot import Robot
+
+
+class ExperimentName(StrEnum):
+    """Experiments that can be run over the wire."""
+
+    fixed = "fixed"
+    path = "path"
+
+
+def experiment_loop(
+    name: str, robot: Robot, law: Law | None = None, seed: int = 0, sensor: str = "ideal"
+) -> tuple[Any, float]:
+    """A loop with `controller`, `plant`, `scene`, `step` and `advance`, and how long the experiment takes [s]."""
+    kind = {ExperimentName.fixed: FixedExperiment, ExperimentName.path: PathExperiment}[ExperimentName(name)]
+    experiment = kind(robot, law, seed=seed, sensor=sensor)
+    return FixedLoop(experiment), experiment.duration

@@ -1,0 +1,179 @@
+"""`qpsafe stream` and a simulated IRC5 as two processes on loopback, on ports that the system chooses."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from qpsafe.cli.main import app
+from qpsafe.errors import QpsafeError
+from qpsafe.irc5.messages import decode_sensor
+from qpsafe.irc5.reference_log import read_references
+from qpsafe.robot.loader import load_robot
+from qpsafe.sim.experiments import experiment_loop
+from qpsafe.sim.irc5_compare import agreement, in_one_process, over_the_wire, stream_process
+from qpsafe.sim.irc5_link import WireFaults
+from qpsafe.sim.irc5_loop import Irc5Loop
+from qpsafe.sim.irc5_motion import EgmSettings
+from qpsafe.sim.irc5_process import happenings, run_robot
+from qpsafe.sim.irc5_udp import NoAnswerError, UdpExchange
+
+PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
+
+
+def test_over_the_wire_as_in_one_process(tmp_path: Path) -> None:
+    """In lock-step, to the bit: the wire loses nothing of any number."""
+    robot, settings = load_robot("irb140"), EgmSettings()
+    log = tmp_path / "references.qpref"
+    wire, seen, report = over_the_wire("path", robot, 2.0, settings, "--log", str(log), lockstep=True)
+    here = in_one_process("path", robot, 2.0, settings)
+    found = agreement(wire, here)
+    assert found.moved > 0.01
+    assert found.largest == 0.0
+    assert (seen.counts["answered"], seen.counts["missed"], seen.rejected) == (len(wire), 0, 0)
+    # and the stream's own account of it
+    assert report["good"] is True
+    assert report["state"] == "stopped"
+    assert report["stop_category"] == 1
+    assert report["answered"] >= len(wire)
+    assert report["sensors"]["used"] >= len(wire)
+    assert report["response"]["count"] == report["answered"]
+    references = read_references(log).references
+    assert len(references) > 0.5 * len(wire)
+    steps = np.diff([reference.q for reference in references], axis=0)
+    assert (np.abs(steps) <= robot.max_velocity * 0.004 * (1 + 1e-9)).all()
+
+
+@pytest.mark.slow
+def test_bad_wire_restart_and_motors_off_over_real_sockets() -> None:
+    """Everything at once, in real time: the stream goes on, and ends at rest."""
+    robot = load_robot("irb140")
+    spoilt = WireFaults(loss=0.1, delay=0.004, reorder=0.1, duplicate=0.1, garbage=0.2)
+    with stream_process("--no-sensors", "--watchdog", "5", "--experiment", "path") as stream:
+        exchange = UdpExchange(robot.nq, stream.addresses["the robot"], strangers=0.0)
+        try:
+            run = Irc5Loop(experiment_loop("path", robot)[0], exchange, EgmSettings())
+            todo = happenings([1.2], [(2.0, 0.2)], [(2.6, 0.2)], spoilt, (0.3, 0.5), 0.3)
+            seen = run_robot(run, exchange, 3.6, todo=todo)
+        finally:
+            exchange.close()
+    report = stream.report
+    assert report["failure"] == ""
+    assert report["datagrams"]["wrong_sender"] > 0
+    assert report["datagrams"]["garbage"] > 0
+    assert report["datagrams"]["answered"] > 100
+    causes = " ".join(item["cause"] for item in report["transitions"])
+    assert "motors off" in causes
+    assert "RAPID stopped" in causes
+    assert seen.counts["restarts"] == 1
+    assert seen.speed <= robot.max_velocity.max()
+    assert report["state"] == "stopped"
+
+
+@pytest.mark.slow
+def test_ctrl_c_ramps_out_before_silence() -> None:
+    """The last answers before the stream falls silent are a pose at rest."""
+    robot = load_robot("irb140")
+    answers = []
+    with stream_process("--no-sensors", "--watchdog", "5", "--experiment", "path") as stream:
+        exchange = UdpExchange(robot.nq, stream.addresses["the robot"], lockstep=5.0)
+        receive = exchange._wait
+
+        def kept() -> list[bytes]:
+            came = receive()
+            answers.extend(came)
+            return came
+
+        exchange._wait = kept  # type: ignore[method-assign]
+        run = Irc5Loop(experiment_loop("path", robot)[0], exchange, EgmSettings())
+        _go(run, 400)
+        stream.process.send_signal(signal.SIGINT)
+        exchange._lockstep = 0.5  # type: ignore[misc]
+        with pytest.raises(NoAnswerError):
+            _go(run, 1000)
+        exchange.close()
+    found = [decode_sensor(data, 6) for data in answers]
+    assert max(np.abs(answer.qd_ref).max() for answer in found[350:400]) > 0.0
+    assert (found[-1].qd_ref == 0.0).all()
+    assert (found[-1].q_ref == found[-40].q_ref).all()  # the pose at rest was sent for a while
+    changes = np.abs(np.diff([answer.qd_ref for answer in found], axis=0))
+    assert (changes <= robot.max_acceleration * 0.004 * (1.0 + 1e-6)).all()
+    assert stream.process.returncode == 0
+
+
+def _go(run: Irc5Loop, cycles: int) -> None:
+    for _ in range(cycles):
+        run.step()
+        run.advance()
+
+
+@pytest.mark.slow
+def test_a_hanging_loop_is_ended_by_the_watchdog() -> None:
+    """SIGSTOP stands for a loop that hangs: its process is killed, the robot hears nothing more."""
+    robot = load_robot("irb140")
+    with stream_process("--no-sensors", "--watchdog", "0.3") as stream:
+        exchange = UdpExchange(robot.nq, stream.addresses["the robot"])
+        run = Irc5Loop(experiment_loop("fixed", robot)[0], exchange, EgmSettings())
+        run_robot(run, exchange, 0.2)
+        stream.process.send_signal(signal.SIGSTOP)
+        assert stream.process.wait(timeout=60.0) == -signal.SIGKILL
+        exchange.close()
+    assert stream.report == {}
+    assert any("no heartbeat" in line for line in stream.said)
+
+
+@pytest.mark.slow
+def test_ctrl_c_without_a_robot_leaves_at_once() -> None:
+    with stream_process("--watchdog", "0") as stream:
+        started = time.monotonic()
+    assert time.monotonic() - started < 60.0
+    assert stream.process.returncode == 0
+    assert stream.report["answered"] == 0
+    assert stream.report["good"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["stream", "--host", "0.0.0.0"], "host"),
+        (["stream", "--program", "no-such.toml"], "no-such.toml"),
+        (["stream", "--cell", "no-such.toml"], "no-such.toml"),
+        (["stream", "--experiment", "fixed", "--program", "x.toml"], "--program"),
+        (["stream", "--events", "nowhere"], "HOST:PORT"),
+        (["stream", "--robot", "r2d2"], "r2d2"),
+        (["irc5-sim", "--motors-off", "soon"], "START:LENGTH"),
+        (["irc5-sim", "--lock-step", "--restart", "1"], "lock-step"),
+    ],
+)
+def test_what_is_configured_wrongly_is_named(arguments: list[str], word: str) -> None:
+    """`main` prints these errors in one line, see tests/cli."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 1
+    assert isinstance(result.exception, QpsafeError)
+    assert word in str(result.exception)
+
+
+@pytest.mark.parametrize("command", ["stream", "irc5-sim", "irc5-faults"])
+def test_help(command: str) -> None:
+    assert CliRunner().invoke(app, [command, "--help"]).exit_code == 0
+
+
+@pytest.mark.slow
+def test_a_simulated_robot_that_nobody_answers_says_so() -> None:
+    arguments = ["irc5-sim", "--port", "9", "--sensor-port", "0", "--event-port", "0", "--json"]
+    process = subprocess.Popen([*PROGRAM, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    while "sending" not in (line := process.stderr.readline()):
+        assert line
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
