@@ -44,6 +44,7 @@ _PUBLIC = {
     "WeightedLaw": "qpsafe.laws.weighted",
     "Wire": "qpsafe.robot.wire",
     "bundled_robots": "qpsafe.robot.loader",
+    "load_cell": "qpsafe.sensing.cell_file",
     "load_converter": "qpsafe.sensing.calibration",
     "load_program": "qpsafe.tasks.program_file",
     "load_robot": "qpsafe.robot.loader",
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from qpsafe.robot.loader import load_robot as load_robot
     from qpsafe.robot.wire import Wire as Wire
     from qpsafe.sensing.calibration import load_converter as load_converter
+    from qpsafe.sensing.cell_file import load_cell as load_cell
     from qpsafe.sensing.hulls import Obstacle as Obstacle
     from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
