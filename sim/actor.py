@@ -9,11 +9,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
 from qpsafe.sim.anatomy import Body
 from qpsafe.sim.footsteps import Footsteps
-from qpsafe.sim.person import Board, Person, PersonPose
+from qpsafe.sim.person import Board, Foot, Person, PersonPose
 from qpsafe.sim.posture import EDGE, HANG, Arm, Point, Posture, Stoop
 from qpsafe.sim.story_steps import PersonTable
 from qpsafe.sim.walker import SHARP, TURNING, Course, Root, Turn, Walk, eased
@@ -109,6 +110,17 @@ class Actor:
         """The whole person at a time [s]."""
         return self.person.pose(*self.course(time), self._footsteps(time), self.posture(time))
 
+    def footprints(self, until: float) -> tuple[list[Foot], list[Foot]]:
+        """Where left and right foot stand, one after another, until a time [s]."""
+        first = self._footsteps(0.0)
+        left, right = ([s.goal for s in steps if s.start < until] for steps in self._footsteps.steps)
+        return [first[0], *left], [first[1], *right]
+
+    def reached(self, step: Taken) -> list[NDArray[np.float64]]:
+        """Where the hands of a reaching step are at its end (3,) [m], those that hang left out."""
+        posture, hands = self.posture(step.end), self.pose(step.end).hands
+        return [hand for arm, hand in zip(posture.arms, hands, strict=True) if not isinstance(arm.goal, str)]
+
     def posture(self, time: float) -> Posture:
         """What arms, back and head do at a time [s]."""
         arms = [Arm(self._first, self._first)] * 2
@@ -156,19 +168,19 @@ class Actor:
                 raise self._problem([*keys, "to"], point, f"a place at least 0.05 m from {_text(here)}, the one before")
             direction = math.atan2(point[1] - here[1], point[0] - here[0])
             if before is not None and abs(math.remainder(direction - before, 2.0 * math.pi)) > SHARP:
-                self._go(stretch, step.speed, turning)
+                self._go(stretch, step, turning)
                 stretch = []
             stretch.append(point)
             before, here = direction, point
             if k == len(points) - 1:
-                self._go(stretch, step.speed, turning)
+                self._go(stretch, step, turning)
 
-    def _go(self, points: list[tuple[float, float]], speed: float, turning: bool) -> None:
+    def _go(self, points: list[tuple[float, float]], step: Any, turning: bool) -> None:
         """Turn towards the first point if need be, then walk."""
         x, y, _ = self.course.last
         if turning:
             self._face(math.atan2(points[0][1] - y, points[0][0] - x), TURNING)
-        self.end = self.course.add(Walk(self.end, self.course.last, points, speed, turning))
+        self.end = self.course.add(Walk(self.end, self.course.last, points, step.speed, turning, step.ease))
 
     def _face(self, heading: float, rate: float) -> None:
         angle = math.remainder(heading - self.course.last[2], 2.0 * math.pi)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from qpsafe.recovery import RecoveryRules
     from qpsafe.robot.robot import Robot
     from qpsafe.sensing.rules import SensingRules
+    from qpsafe.sim.story import Story
 
 Observer = Callable[[Tick, Scene, Plant], None]
 
@@ -45,6 +46,7 @@ class FixedExperiment:
         cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it.
         recovery: How the robot returns to its path; None for the controller's default.
+        story: Who does what instead of the choreography; `seed` varies it too.
     """
 
     robot: Robot
@@ -58,16 +60,17 @@ class FixedExperiment:
     cap: float | None = None
     choreography: Choreography = field(default_factory=Choreography)
     recovery: RecoveryRules | None = None
+    story: Story | None = None
 
     @cached_property
     def scene(self) -> Scene:
         """The world, built on first use."""
-        return build_scene(self.robot)
+        return build_scene(self.robot, people=self.walk.persons)
 
     @cached_property
-    def walk(self) -> Choreography:
-        """The choreography as this seed varies it."""
-        return self.choreography.varied(self.seed)
+    def walk(self) -> Choreography | Story:
+        """The choreography, or the story, as this seed varies it."""
+        return (self.story or self.choreography).varied(self.seed)
 
     @cached_property
     def reference(self) -> Trajectory:
@@ -115,7 +118,7 @@ class FixedExperiment:
         data = scene.make_data()
         result = np.empty(round(self.duration / dt))
         for k in range(len(result)):
-            scene.place_person(data, walk.pose(k * dt))
+            scene.place_people(data, walk.poses(k * dt))
             result[k] = board_distance(scene, data).distance
         return result
 

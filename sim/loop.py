@@ -69,7 +69,7 @@ class FixedLoop:
     def step(self, fault: Fault | None = None) -> Moment:
         """Sense, control and tell the servo; the world stands still until `advance`."""
         controller, plant = self.controller, self.plant
-        self.scene.place_person(plant.data, self.walk.pose(self.k * controller.dt))
+        self.scene.place_people(plant.data, self.walk.poses(self.k * controller.dt))
         q, qd = plant.q, plant.qd
         state = controller.robot.at(q)
         distances, ages = self.sensor.read(plant.data, state), None

@@ -60,6 +60,11 @@ class PathExperiment(FixedExperiment):
     program: Path = PROGRAM
 
     @cached_property
+    def program_text(self) -> str:
+        """What the program's file says."""
+        return self.program.read_text(encoding="utf-8")
+
+    @cached_property
     def reference(self) -> Program:
         """The tool's program."""
         return load_program(self.program, self.robot)

@@ -244,7 +244,8 @@ class Person:
         wrists, fingers, board = np.zeros((2, 3)), np.zeros((2, 3)), self.board
         for i, side in enumerate((1.0, -1.0) if board is not None else ()):
             edge_x, edge_y = reach - board.thickness / 2, side * (board.width / 2 + 0.012)  # type: ignore[union-attr]
-            wrists[i] = edge_x - 0.055, edge_y, centre - 0.07
+            # the fingertips a little past the board, whatever the length of the hand
+            wrists[i] = edge_x - max(self.body.hand - 0.02, 0.055), edge_y, centre - 0.07
             fingers[i] = wrists[i] + self.body.hand * np.array(_FINGERS)
         return wrists, fingers
 

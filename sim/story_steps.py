@@ -36,6 +36,7 @@ class WalkStep(Step):
     to: Place | Annotated[list[Place], Field(min_length=1)]
     speed: WalkingSpeed = 1.0
     facing: Literal["travel", "keep"] = "travel"
+    ease: Annotated[float, Field(strict=True, ge=0.2, le=5.0)] | None = None  # time to reach the speed, and to stop [s]
 
 
 class WaitStep(Step):

@@ -74,13 +74,19 @@ class Walk:
     """A walk from a root along way-points, turning towards travel unless told to keep the heading."""
 
     def __init__(
-        self, start: float, root: Root, points: Sequence[tuple[float, float]], speed: float, turning: bool = True
+        self,
+        start: float,
+        root: Root,
+        points: Sequence[tuple[float, float]],
+        speed: float,
+        turning: bool = True,
+        ease: float | None = None,
     ) -> None:
-        """Plan it: `start` [s], way-points (x, y) [m], speed [m/s]; no corner may be sharper than `SHARP`."""
+        """Plan it: `start` [s], way-points (x, y) [m], speed [m/s], T [s]; no corner may be sharper than `SHARP`."""
         corners = np.array([root[:2], *points])
         legs = np.diff(corners, axis=0)
         lengths = np.hypot(*legs.T)
-        self.start, self._root, self.ease = start, root, EASE[0] + EASE[1] * speed
+        self.start, self._root, self.ease = start, root, ease or EASE[0] + EASE[1] * speed
         self._times = start + 0.5 * self.ease + np.concatenate(([0.0], np.cumsum(lengths))) / speed
         self.end = float(self._times[-1] + 0.5 * self.ease)
         velocities = speed * legs / lengths[:, None]

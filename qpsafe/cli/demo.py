@@ -20,6 +20,7 @@ from qpsafe.cli.common import (
     progress_bar,
     write_text,
 )
+from qpsafe.cli.demo_fast import fast_person
 from qpsafe.cli.demo_path import path
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from qpsafe.sim.fixed import FixedExperiment, Observer
     from qpsafe.sim.log import RunLog
     from qpsafe.sim.report import Report
+    from qpsafe.sim.run_file import StateRecorder
 
 app = typer.Typer(help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
 
@@ -44,13 +46,16 @@ def fixed(
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
     ] = 0.0,
-    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Length of the run [s].")] = 60.0,
+    duration: Annotated[
+        float | None, typer.Option(min=0.1, max=600.0, help="Length of the run [s]; 60, or the story's.")
+    ] = None,
     sensor: Annotated[
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
     cap: Annotated[
         float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default it is not.")
     ] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the source's.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -60,50 +65,67 @@ def fixed(
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.encounter import encounter
     from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.story_file import load_story
 
+    told = None if story is None else load_story(story)
     experiment = FixedExperiment(
         load_robot("irb140"),
         make_law(law, projection, solver),
         seed=seed,
         lag=lag,
-        duration=duration,
+        duration=duration or (60.0 if told is None else told.duration),
+        story=told,
         sensor=sensor.value,
         cap=cap,
     )
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
     out.mkdir(parents=True, exist_ok=True)
-    files = ["signals.csv", "figure.png", "distance.png", "report.json"]
-    log, filmed = _run(experiment, title, out / "video.mp4", video, view, screen)
+    files = ["signals.csv", "figure.png", "distance.png", "report.json", "run.npz"]
+    log, filmed = _run(experiment, out, video, view, screen)
     if filmed:
         files.append("video.mp4")
     report = _write(experiment, log, title, out)
+    near = encounter(log, experiment.robot)
     if json:
-        print_json(report.to_dict())
+        print_json(report.to_dict() | {"encounter": near.to_dict()})
     else:
         show(report, title, screen)
+        if told is not None:
+            screen.print(near.sentence(), highlight=False)
         screen.print(f"written to {out}: {', '.join(files)}", highlight=False)
     if not report.kept:
         raise typer.Exit(1)
 
 
-def _run(
-    experiment: FixedExperiment, title: str, path: Path, video: bool, view: bool, screen: Console
-) -> tuple[RunLog, bool]:
-    """Run with a progress bar, filmed if possible."""
-    label = f"{experiment.duration:g} s, 250 Hz"
+def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen: Console) -> tuple[RunLog, bool]:
+    """Run with a progress bar, filmed if possible, and write the run's file."""
+    from qpsafe.sim.run_file import StateRecorder, write_run
+    from qpsafe.sim.settings import settings_of
+
+    label, states = f"{experiment.duration:g} s, 250 Hz", StateRecorder()
     with (
         progress_bar(screen) as progress,
-        observed(experiment, path, video, view, screen, progress, label) as (observer, filmed),
+        observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, filmed),
     ):
-        return experiment.run(observer), filmed
+        log = experiment.run(observer)
+    write_run(out / "run.npz", log, settings_of(experiment), experiment.robot, states)
+    return log, filmed
 
 
 @contextmanager
 def observed(
-    experiment: FixedExperiment, path: Path, video: bool, view: bool, screen: Console, progress: Progress, label: str
+    experiment: FixedExperiment,
+    path: Path,
+    video: bool,
+    view: bool,
+    screen: Console,
+    progress: Progress,
+    label: str,
+    states: StateRecorder | None = None,
 ) -> Iterator[tuple[Observer, bool]]:
-    """What to call at every tick to film, show and count it, and whether it is filmed; says in one line why not."""
+    """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not."""
     from qpsafe.danger.activation import Activation
     from qpsafe.errors import MissingExtraError
     from qpsafe.sensing.spots import load_spots
@@ -113,7 +135,7 @@ def observed(
     spots = load_spots(experiment.robot)
     assert spots is not None
     with ExitStack() as stack:
-        observers: list[Any] = []
+        observers: list[Any] = [] if states is None else [states.observe]
         filmed = False
         if video and not view:
             available, reason = gl_available()
@@ -144,12 +166,16 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
     """Write csv, figures and report, each whole or not at all."""
     from qpsafe.sim.plots import distance_figure, figure_11
     from qpsafe.sim.report import summarise
+    from qpsafe.sim.story_plots import encounter_figure
 
     without = experiment.board_distance_without_controller()
     report = summarise(log, without, experiment.windows(), experiment.robot)
     log.write_csv(out / "signals.csv")
     figure_11(log, out / "figure.png", f"First experiment, {title}")
-    distance_figure(log, without, out / "distance.png")
+    if experiment.story is None:
+        distance_figure(log, without, out / "distance.png")
+    else:
+        encounter_figure(log, out / "distance.png")
     write_text(out / "report.json", json_module.dumps(report.to_dict(), indent=2) + "\n")
     return report
 
@@ -177,14 +203,15 @@ def show(report: Report, title: str, screen: Console) -> None:
         )
     screen.print(table)
 
-    table = Table(title="Smallest true distance between robot and board")
-    for heading in ("approach [s]", "with controller [m]", "without [m]", "gained [m]"):
-        table.add_column(heading, justify="right")
-    for approach in report.approaches:
-        gained = approach.with_controller - approach.without_controller
-        numbers = (approach.with_controller, approach.without_controller, gained)
-        table.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
-    screen.print(table)
+    if report.approaches:
+        table = Table(title="Smallest true distance between robot and board")
+        for heading in ("approach [s]", "with controller [m]", "without [m]", "gained [m]"):
+            table.add_column(heading, justify="right")
+        for approach in report.approaches:
+            gained = approach.with_controller - approach.without_controller
+            numbers = (approach.with_controller, approach.without_controller, gained)
+            table.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
+        screen.print(table)
 
     table = Table(title="What the run should show")
     for heading in ("", "", "measured", "promised"):
@@ -202,3 +229,4 @@ def show(report: Report, title: str, screen: Console) -> None:
 
 
 app.command()(path)
+app.command("fast-person")(fast_person)

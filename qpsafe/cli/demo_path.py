@@ -24,9 +24,12 @@ def path(
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
     ] = 0.0,
-    duration: Annotated[float, typer.Option(min=3.0, max=600.0, help="Length of each run [s].")] = 45.0,
+    duration: Annotated[
+        float | None, typer.Option(min=3.0, max=600.0, help="Length of each run [s]; 45, or the story's.")
+    ] = None,
     program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the bundled.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-path"),
     video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
@@ -44,11 +47,17 @@ def path(
     from qpsafe.laws.nullspace import NullspaceLaw
     from qpsafe.recovery import RecoveryRules
     from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.encounter import encounter
     from qpsafe.sim.path import PROGRAM, PathExperiment
     from qpsafe.sim.path_plots import side_by_side
     from qpsafe.sim.path_report import figures, promises, to_dict
     from qpsafe.sim.plots import figure_11
+    from qpsafe.sim.run_file import StateRecorder, write_run
+    from qpsafe.sim.settings import settings_of
+    from qpsafe.sim.story_file import load_story
 
+    told = None if story is None else load_story(story)
+    length = duration or (45.0 if told is None else told.duration)
     robot, strict = load_robot("irb140"), HierarchicalLaw(solver=solver)
     laws: dict[str, Law] = {
         "strict": strict,
@@ -62,27 +71,33 @@ def path(
             law,
             seed=seed,
             lag=lag,
-            duration=duration,
+            duration=length,
+            story=told,
             recovery=RecoveryRules(enabled="no recovery" not in name),
             program=PROGRAM if program is None else program,
         )
         for name, law in laws.items()
     }
     first = experiments["strict"]
-    length = first.reference.duration  # a wrong program is refused before anything is written or run
-    screen.print(f"{first.program.name}: one cycle takes {length:.1f} s", style="dim", highlight=False)
+    cycle = first.reference.duration  # a wrong program is refused before anything is written or run
+    screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim", highlight=False)
     out.mkdir(parents=True, exist_ok=True)
-    runs, found = {}, {}
+    runs, found, near = {}, {}, {}
     with progress_bar(screen) as progress:
         for name, experiment in experiments.items():
-            shown = video and name == "strict", view and name == "strict"
-            with observed(experiment, out / "video.mp4", *shown, screen, progress, name) as (observer, _):
+            shown, states = (video and name == "strict", view and name == "strict"), StateRecorder()
+            with observed(experiment, out / "video.mp4", *shown, screen, progress, name, states) as (observer, _):
                 runs[name] = experiment.run_path(observer)
             found[name] = figures(runs[name], robot)
-            runs[name].log.write_csv(out / f"signals-{name.replace(', ', '-').replace(' ', '-')}.csv")
+            near[name] = encounter(runs[name].log, robot)
+            tag = name.replace(", ", "-").replace(" ", "-")
+            runs[name].log.write_csv(out / f"signals-{tag}.csv")
+            write_run(out / f"run-{tag}.npz", runs[name].log, settings_of(experiment), robot, states)
     others = {name: found[name] for name in ("paper", "nullspace")}
     checks = promises(found["strict"], found["strict, no recovery"], others)
-    result = to_dict(found, checks)
+    if told is not None:  # the other promises are about the bundled people
+        checks = [check for check in checks if "largest step" in check.name]
+    result = to_dict(found, checks) | {"encounters": {name: item.to_dict() for name, item in near.items()}}
     figure_11(runs["strict"].log, out / "figure.png", "Second experiment, hierarchical law, strict projection")
     side_by_side({name: run for name, run in runs.items() if "," not in name}, robot, out / "side-by-side.png")
     write_text(out / "report.json", json_module.dumps(result, indent=2) + "\n")
@@ -90,7 +105,11 @@ def path(
         print_json(result)
     else:
         show(found, checks, screen)
-        screen.print(f"written to {out}: figure.png, side-by-side.png, report.json, signals-*.csv", highlight=False)
+        if told is not None:
+            for name, item in near.items():
+                screen.print(f"{name}: {item.sentence()}", highlight=False)
+        files = "figure.png, side-by-side.png, report.json, signals-*.csv, run-*.npz"
+        screen.print(f"written to {out}: {files}", highlight=False)
     if not result["kept"]:
         raise typer.Exit(1)
 

@@ -9,7 +9,19 @@ from typing import Annotated
 import typer
 
 from qpsafe import __version__
-from qpsafe.cli import bench, calibrate, compare, demo, irc5_faults, irc5_sim, robots, sick_sensors, stream
+from qpsafe.cli import (
+    bench,
+    calibrate,
+    compare,
+    demo,
+    irc5_faults,
+    irc5_sim,
+    replay,
+    robots,
+    sick_sensors,
+    story,
+    stream,
+)
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(
@@ -23,6 +35,8 @@ app.command("compare")(compare.compare)
 app.command("robots")(robots.robots)
 app.command("bench")(bench.bench)
 app.command("calibrate")(calibrate.calibrate)
+app.command("story")(story.story)
+app.command("replay")(replay.replay)
 app.command("sick-sensors")(sick_sensors.sick_sensors)
 app.command("stream")(stream.stream)
 app.command("irc5-sim")(irc5_sim.irc5_sim)

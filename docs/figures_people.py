@@ -1,0 +1,61 @@
+"""Draw the figures about people: ``python docs/figures_people.py [NAME ...]`` writes docs/img/NAME.png."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import qpsafe
+from qpsafe.sim.fast_person import fast_figure, runs
+from qpsafe.sim.scene import build_scene
+from qpsafe.sim.story_file import load_story
+from qpsafe.sim.story_plots import plan_figure
+
+ROOT = Path(__file__).resolve().parents[1]
+IMG = ROOT / "docs" / "img"
+STORY = ROOT / "examples" / "two_people.toml"
+
+
+def stories_plan() -> None:
+    """The example from above."""
+    plan_figure(load_story(STORY), IMG / "stories-plan.png")
+
+
+def stories_people() -> None:
+    """Six moments of the example."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    from qpsafe.sim.render import Camera
+
+    story = load_story(STORY)
+    scene = build_scene(qpsafe.load_robot("irb140"), people=story.persons)
+    data, camera = scene.make_data(), Camera(scene, (640, 400))
+    frames = []
+    font = ImageFont.load_default(22)
+    for time in (1.4, 4.6, 7.3, 8.6, 10.5, 13.5):
+        scene.place_people(data, story.poses(time))
+        picture = Image.fromarray(np.ascontiguousarray(camera.picture(data)))
+        ImageDraw.Draw(picture).text((14, 366), f"{time:.1f} s", fill=(20, 20, 20), font=font)
+        frames.append(np.asarray(picture))
+    camera.close()
+    sheet = np.vstack([np.hstack(frames[:3]), np.hstack(frames[3:])])
+    Image.fromarray(sheet).resize((1440, 600)).save(IMG / "stories-people.png")
+
+
+def fast_person() -> None:
+    """How near somebody comes who walks straight at the robot."""
+    fast_figure(list(runs(qpsafe.load_robot("irb140"))), IMG / "fast-person.png")
+
+
+FIGURES: dict[str, Callable[[], None]] = {
+    "stories-plan": stories_plan,
+    "stories-people": stories_people,
+    "fast-person": fast_person,
+}
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or FIGURES:
+        FIGURES[name]()

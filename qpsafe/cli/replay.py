@@ -1,0 +1,106 @@
+"""`qpsafe replay`: a recorded run once more, compared bit by bit, looked at or filmed."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.replay import Replay
+    from qpsafe.sim.run_file import RunFile
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(help="A run.npz that a demo wrote.")],
+    video: Annotated[Path | None, typer.Option(help="Also film the recorded run into this mp4.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Also show it in MuJoCo's viewer; needs a display.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
+) -> None:
+    """Run the controller again on a run's recorded inputs and compare every answer with the recorded one, bit by bit.
+
+    Exit code 0 if all are the same, 1 at the first bit that differs: which tick, which answer, by how much, and which
+    versions or robot files have changed since.
+    """
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.sim.replay import replay as run_again
+    from qpsafe.sim.run_file import read_run
+    from qpsafe.sim.settings import experiment_of
+
+    run = read_run(file)
+    experiment = experiment_of(run.header["settings"])
+    with progress_bar(screen) as progress, ExitStack() as stack:
+        watchers: list[Any] = []
+        if video is not None or view:
+            watchers += _watchers(run, experiment, video, view, stack)
+        task = progress.add_task(file.name, total=run.ticks)
+
+        def watch(*state: Any) -> None:
+            for watcher in watchers:
+                watcher(*state)
+            progress.advance(task)
+
+        found = run_again(run, watch, experiment)
+    if json:
+        print_json({"file": str(file), **found.to_dict()})
+    else:
+        _show(found, run, screen)
+        if video is not None:
+            screen.print(f"written to {video}", highlight=False)
+    if not found.same:
+        raise typer.Exit(1)
+
+
+def _watchers(run: RunFile, experiment: Any, video: Path | None, view: bool, stack: ExitStack) -> list[Any]:
+    """What draws the recorded states."""
+    from qpsafe.danger.activation import Activation
+    from qpsafe.sensing.spots import load_spots
+    from qpsafe.sim.film import Film, Viewer
+    from qpsafe.sim.gl import gl_available
+    from qpsafe.sim.run_file import RunFileError
+    from qpsafe.sim.stage import Stage
+
+    stage = Stage(run, experiment)
+    spots = load_spots(experiment.robot)
+    assert spots is not None
+    observers: list[Any] = []
+    if video is not None:
+        available, reason = gl_available()
+        if not available:
+            raise RunFileError(f"no video: {reason}")
+        observers.append(stack.enter_context(Film(video, experiment.scene, spots, Activation())).observe)
+    if view:
+        viewer = Viewer(experiment.scene, spots, Activation())
+        stack.callback(viewer.close)
+        observers.append(viewer.observe)
+
+    def watch(k: int, tick: Any) -> None:
+        if stage.show(k):
+            for observer in observers:
+                observer(tick, experiment.scene, stage)
+
+    return [watch]
+
+
+def _show(found: Replay, run: RunFile, screen: Console) -> None:
+    recorded = run.header["versions"].get("qpsafe", "?")
+    if found.same:
+        screen.print(f"[green]same[/]: all {found.ticks} ticks, every bit (recorded with qpsafe {recorded})")
+    else:
+        first = found.first
+        assert first is not None
+        screen.print(
+            f"[red]different[/]: {found.different} of {found.ticks} ticks; the first is tick {first.tick} "
+            f"at {first.time:.3f} s: {first.what} was {first.recorded}, is {first.replayed} "
+            f"(difference {first.largest:.3g}); largest difference of q_ref {found.largest:.3g} rad",
+            highlight=False,
+        )
+    for change in found.changed:
+        screen.print(f"changed since: {change}", style="yellow", highlight=False)

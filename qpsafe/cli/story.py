@@ -1,0 +1,46 @@
+"""`qpsafe story`: check a story, say who does what when, draw it from above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from qpsafe.cli.common import console, print_json
+
+
+def story(
+    file: Annotated[Path, typer.Argument(help="TOML file of who does what.")],
+    plot: Annotated[Path | None, typer.Option(help="Draw ways and footprints from above into this PNG file.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the times as JSON to standard output.")] = False,
+) -> None:
+    """Check a story of people around the robot, and say when who does what.
+
+    Exit code 1 if it is wrong; the message names line, key and what was expected.
+    """
+    from qpsafe.sim.story_file import load_story
+
+    screen, told = console(json), load_story(file)
+    rows = [
+        {"person": actor.name, "from": round(step.start, 3), "to": round(step.end, 3), "does": step.do}
+        for actor in told.people
+        for step in actor.steps
+    ]
+    if plot is not None:
+        from qpsafe.sim.story_plots import plan_figure
+
+        plan_figure(told, plot)
+    if json:
+        events = [{"time": time, "person": name, "event": event} for time, name, event in told.events]
+        print_json({"duration": told.duration, "steps": rows, "events": events})
+        return
+    from rich.table import Table
+
+    table = Table(title=told.table.title or file.name)
+    for heading in ("who", "from [s]", "to [s]", "does"):
+        table.add_column(heading, justify="right" if "[s]" in heading else "left")
+    for row in rows:
+        table.add_row(str(row["person"]), f"{row['from']:.2f}", f"{row['to']:.2f}", str(row["does"]))
+    screen.print(table)
+    screen.print(f"{told.duration:.2f} s" + (f"; drawn into {plot}" if plot else ""), highlight=False)

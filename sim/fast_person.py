@@ -1,0 +1,114 @@
+"""Somebody walks straight at the robot, faster and faster: contact or not, experiment by experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qpsafe.sim.encounter import Encounter, encounter
+from qpsafe.sim.fixed import FixedExperiment, Observer
+from qpsafe.sim.log import RunLog
+from qpsafe.sim.path import PathExperiment
+from qpsafe.sim.plots import STYLE, save
+from qpsafe.sim.story import Story
+from qpsafe.sim.story_file import load_story
+from qpsafe.sim.story_steps import WalkStep
+
+if TYPE_CHECKING:
+    from qpsafe.laws.problem import Law
+    from qpsafe.robot.robot import Robot
+
+#: The bundled story: 2.0 m/s up to the pedestal's foot.
+STORY = Path(__file__).with_name("fast-person.toml")
+SPEEDS = (0.5, 1.0, 1.6, 2.0)
+EXPERIMENTS: dict[str, Callable[..., FixedExperiment]] = {"fixed": FixedExperiment, "path": PathExperiment}
+
+
+@dataclass(frozen=True)
+class FastRun:
+    """One run: which experiment, how fast somebody walked [m/s], how it ended."""
+
+    experiment: str
+    speed: float
+    encounter: Encounter
+    built: FixedExperiment
+    log: RunLog
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"experiment": self.experiment, "speed": self.speed, **self.encounter.to_dict()}
+
+
+def at_speed(speed: float, story: Story | None = None) -> Story:
+    """The story with its first walk at another speed [m/s]; later, so that all arrive at about the same time."""
+    story = story or load_story(STORY)
+    people = []
+    for person in story.table.person:
+        steps, walks = list(person.step), [k for k, step in enumerate(person.step) if isinstance(step, WalkStep)]
+        if walks:
+            steps[walks[0]] = WalkStep(**{**steps[walks[0]].model_dump(), "speed": speed})
+        people.append(person.model_copy(update={"step": steps}))
+    duration = max(actor.steps[2].end for actor in Story(story.table.model_copy(update={"person": people})).people)
+    table = story.table.model_copy(update={"person": people, "duration": duration})
+    return Story(table, story.floor)
+
+
+def runs(
+    robot: Robot,
+    law: Law | None = None,
+    speeds: tuple[float, ...] = SPEEDS,
+    names: tuple[str, ...] = tuple(EXPERIMENTS),
+    lag: float = 0.0,
+    observer: Callable[[str, float, FixedExperiment], Any] | None = None,
+) -> Iterator[FastRun]:
+    """Run every experiment at every speed.
+
+    Args:
+        robot: Of the experiments.
+        law: Of the controller; None for its default.
+        speeds: Of the person [m/s].
+        names: Of the experiments, keys of `EXPERIMENTS`.
+        lag: Of the plant [s].
+        observer: Called before every run with its name, speed and experiment; returns a context manager that gives the
+            run's observer.
+    """
+    for name in names:
+        for speed in speeds:
+            story = at_speed(speed)
+            built = EXPERIMENTS[name](robot, law, lag=lag, story=story, duration=story.duration)
+            log = _run(built, None if observer is None else observer(name, speed, built))
+            yield FastRun(name, speed, encounter(log, robot), built, log)
+
+
+def _run(experiment: FixedExperiment, watched: Any) -> RunLog:
+    if watched is None:
+        return experiment.run()
+    with watched as observe:
+        observe_: Observer | None = observe
+        return experiment.run(observe_)
+
+
+def fast_figure(found: list[FastRun], path: Path) -> None:
+    """Smallest distance and the robot's speed then, over the person's speed."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(6.4, 4.6), layout="constrained")
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        marks = (("#0b5fa5", "o-"), ("#c0392b", "s--"), ("#2a8c3c", "^-."))
+        for name, (colour, mark) in zip(dict.fromkeys(run.experiment for run in found), marks, strict=False):
+            mine = sorted((run for run in found if run.experiment == name), key=lambda run: run.speed)
+            speeds = [run.speed for run in mine]
+            upper.plot(speeds, [1e3 * run.encounter.distance for run in mine], mark, color=colour, label=name)
+            lower.plot(speeds, [run.encounter.robot_speed for run in mine], mark, color=colour, label=name)
+        upper.axhline(0.0, color="black", linewidth=0.9)
+        upper.set(ylabel="smallest distance\nrobot to person [mm]")
+        lower.set(
+            ylabel="robot's fastest point\nthen, or at contact [m/s]", xlabel="walking speed [m/s]", ylim=(0.0, None)
+        )
+        upper.legend(loc="upper right", bbox_to_anchor=(1.0, 1.0))
+        save(figure, path)
