@@ -52,7 +52,7 @@ def at_speed(speed: float, story: Story | None = None) -> Story:
         people.append(person.model_copy(update={"step": steps}))
     duration = max(actor.steps[2].end for actor in Story(story.table.model_copy(update={"person": people})).people)
     table = story.table.model_copy(update={"person": people, "duration": duration})
-    return Story(table, story.floor)
+    return Story(table, story.text, story.floor)
 
 
 def runs(

@@ -158,7 +158,10 @@ def read_run(path: str | Path) -> RunFile:
         raise
     except FileNotFoundError:
         raise RunFileError(f"{path}: no such file") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as problem:  # type: ignore[attr-defined]
+    except ValueError as problem:
+        why = "no NumPy archive" if "pickle" in str(problem) else str(problem)
+        raise RunFileError(f"{path}: damaged, or not a run of qpsafe: {why}") from None
+    except (OSError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as problem:  # type: ignore[attr-defined]
         raise RunFileError(f"{path}: damaged, or not a run of qpsafe: {problem}") from None
     except (NotImplementedError, RuntimeError, AttributeError, TypeError, MemoryError) as problem:
         raise RunFileError(f"{path}: not a run of qpsafe: {problem}") from None

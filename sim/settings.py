@@ -133,7 +133,8 @@ def _choreography_of(settings: Mapping[str, Any]) -> Choreography:
 
 def _story_of(settings: Mapping[str, Any]) -> Story:
     try:
-        return Story(StoryTable.model_validate({k: v for k, v in settings.items() if k != "floor"}), settings["floor"])
+        table = StoryTable.model_validate({k: v for k, v in settings.items() if k != "floor"})
+        return Story(table, floor=settings["floor"])
     except (ValidationError, StepProblem) as problem:
         raise ConfigurationError(
             "the recorded settings", "story", str(problem), "a story that can be planned"

@@ -23,21 +23,23 @@ class Story:
 
     Attributes:
         table: The checked file.
+        text: The file's text, as it was read; a varied story keeps it.
         people: In the file's order; each has `name`, `pose(time)`, `root(time)`, `steps` and `events`.
         duration: As the file says, else when everybody has done their last step [s].
     """
 
-    def __init__(self, table: StoryTable, floor: float = -0.55) -> None:
+    def __init__(self, table: StoryTable, text: str = "", floor: float = -0.55) -> None:
         """Plan it.
 
         Args:
             table: What is to happen.
+            text: Where `table` was read from.
             floor: Height of the floor, world frame [m].
 
         Raises:
             StepProblem: A step cannot be done.
         """
-        self.table, self.floor = table, floor
+        self.table, self.text, self.floor = table, text, floor
         for k, person in enumerate(table.person):
             if person.name in [other.name for other in table.person[:k]]:
                 raise StepProblem(k, ["name"], person.name, "another name: there is one so called already")
@@ -73,7 +75,7 @@ class Story:
             return self
         rng = np.random.default_rng(seed)
         people = [_varied(person, rng) for person in self.table.person]
-        return Story(self.table.model_copy(update={"person": people}), self.floor)
+        return Story(self.table.model_copy(update={"person": people}), self.text, self.floor)
 
 
 def _varied(person: PersonTable, rng: Any) -> PersonTable:

@@ -72,7 +72,7 @@ def parse_story(text: str, path: str | Path = "story", *, floor: float = -0.55) 
         value = "nothing" if first["type"] == "missing" else first["input"]
         raise _wrong(path, text, _keys(first["loc"]), value, first["msg"]) from None
     try:
-        return Story(file, floor)
+        return Story(file, text, floor)
     except StepProblem as problem:
         keys = ["person", problem.person, *problem.keys]
         raise _wrong(path, text, keys, problem.value, problem.expected) from None
