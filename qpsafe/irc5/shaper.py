@@ -36,6 +36,8 @@ class Shaper:
         self._ticks_out = max(1, math.ceil(ramp_out / self.dt))
         self._most = catch_up * limits.max_velocity
         self.seed(np.zeros_like(limits.lower))
+        self.settle(np.ones_like(limits.lower))  # compiled now, not while a robot waits
+        self.seed(np.zeros_like(limits.lower))
 
     def seed(self, q: Array) -> None:
         """Start anew at rest at q (n,) [rad]."""

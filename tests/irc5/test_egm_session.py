@@ -502,6 +502,16 @@ def test_junk_is_refused_counted_and_changes_nothing(wire: Wire, reason: str) ->
     wire.check_steps(200)
 
 
+@pytest.mark.parametrize("q", [1e306, -1e306, 2e4])
+def test_joints_without_limits_do_not_turn_any_distance_either(q: float) -> None:
+    endless = JointLimits(np.full(N, -np.inf), np.full(N, np.inf), V_MAX, A_MAX, DT)
+    wire = Wire(EgmSession(endless))
+    wire.pass_time()
+    assert not wire.offer(wire.packet(q=np.full(N, q)))
+    assert wire.session.counts["implausible"] == 1
+    wire.run()
+
+
 def test_mixed_units_are_refused_by_name(wire: Wire) -> None:
     """Row: RobotWare < 6.07 -> refuse when feedBack.time is missing."""
     assert not wire.offer(wire.packet(clock=None))
