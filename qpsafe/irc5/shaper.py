@@ -71,10 +71,11 @@ class Shaper:
         self._braking -= 1
         box = self.limits.box(self.q, self.qd)
         wanted = self.qd * (self._braking / (self._braking + 1))
-        self.qd = np.clip(wanted, np.minimum(box.lower, 0.0), np.maximum(box.upper, 0.0))
+        # inside the box, but not back into the position limits: at rest is at rest
+        self.qd = np.clip(box.clip(wanted), np.minimum(self.qd, 0.0), np.maximum(self.qd, 0.0))
         self.q = self.q + self.qd * self.dt
         self.clipped = False
-        return self._braking == 0
+        return not self.qd.any()
 
     def _approach(self, distance: Array) -> Array:
         """Speed to make up for a distance that can still be braked by half the acceleration."""
