@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.danger.activation import Activation
+from qpsafe.danger.compiled import Array, entry, readable
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
@@ -19,6 +21,8 @@ from qpsafe.tasks.task import Task
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
+
+_FLOAT = np.dtype(np.float64)
 
 #: A law that moves a joint by more than this in one tick is broken [rad].
 ABSURD_STEP = 1e3
@@ -93,12 +97,23 @@ def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
 
 
 def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
-    """The velocity a law returned, as an array of its own, if the robot at q could be sent it."""
+    """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be."""
     if not isinstance(result, LawResult):
         raise TypeError(f"the law returned {type(result).__name__}, expected a LawResult")
-    qd = np.asarray(result.qd)
+    qd = result.qd
+    if not (type(qd) is np.ndarray and qd.dtype is _FLOAT):
+        qd = np.asarray(qd)
     if qd.shape != q.shape or qd.dtype.kind not in "fiu":
         raise ValueError(f"the law returned a velocity of shape {qd.shape}, {qd.dtype}, expected {len(q)} real numbers")
-    if not (np.abs(qd) * dt < ABSURD_STEP).all():  # false for NaN; without limits nothing else would stop it
+    qd = np.asarray(qd, dtype=float)
+    if not _all_below(qd, ABSURD_STEP / dt):  # without limits nothing else would stop it
         raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
-    return np.array(qd, dtype=float)
+    return qd
+
+
+@entry(types.boolean(readable(1), types.float64))
+def _all_below(qd: Array, largest: float) -> bool:
+    good = True
+    for i in range(qd.shape[0]):
+        good = good and abs(qd[i]) < largest  # false for NaN
+    return good

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.checks import check_arguments, check_parts, checked_activation, checked_spots, checked_velocity
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
-from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
-from qpsafe.danger.field import DangerField, danger_vectors
+from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.field import DangerField
+from qpsafe.danger.push import push
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law, LawProblem, TaskVelocity
 from qpsafe.limits import Box, JointLimits
@@ -197,7 +199,7 @@ class SafetyController:
         q = as_joint_position(q, self.robot)
         qd = as_joint_velocity(qd, self.robot)
         if not self._active:  # the commanded configuration starts where the robot is
-            self._q, self._qd, self._active = q.copy(), np.zeros(self.robot.nq), True
+            self._q, self._qd, self._active = np.array(q), np.zeros(self.robot.nq), True
 
         # spot distances -> detected points (7), without known obstacles and the robot itself, lost ones held
         measured = self.robot.at(q)
@@ -205,11 +207,8 @@ class SafetyController:
         seen = as_detection(measured, wire, self.sensing, distances, points, ages)
 
         # danger (1)-(6); its vectors summed per link (8), as virtual torque (14), (15), as evasive velocity (16)
-        danger, gradient = self.field.evaluate(seen.points, wire, seen.velocities)
-        vectors = danger_vectors(danger, gradient)
-        cdf_n = float(danger.max(initial=0.0))  # L∞ norm over the points
-        torque = virtual_torque(measured, link_vectors(vectors, seen.links, len(self.robot.wire_frames)))
-        if not (np.isfinite(danger).all() and np.isfinite(torque).all()):  # never into the filter, which remembers
+        danger, vectors, torque, cdf_n = push(self.field, measured, wire, seen.points, seen.links, seen.velocities)
+        if not isfinite(cdf_n):  # never into the filter, which remembers
             raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
         qd0 = self.evasion.step(torque).copy()
 
@@ -217,17 +216,15 @@ class SafetyController:
         activations = self.activation.activations(cdf_n)
         commanded = self.robot.at(self._q)
         samples = self.recovery.update(cdf_n, commanded, activations)
-        tasks = []
-        for task, sample in zip(self.tasks, samples, strict=True):
-            error = task.error(task.value(commanded), sample)
-            tasks.append(TaskVelocity(task.jacobian(commanded), task.velocity(error, sample)))
+        wanted = [task.clik(commanded, sample) for task, sample in zip(self.tasks, samples, strict=True)]
+        tasks = tuple([TaskVelocity(jacobian, velocity) for jacobian, velocity, _ in wanted])
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         box = self.limits.box(self._q, self._qd, self._qdd) if self.limits else None
         lower, upper = (box.lower.copy(), box.upper.copy()) if box else (None, None)
         barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
         soft = (barrier,) if barrier else ()
-        result = self.law.solve(LawProblem(tuple(tasks), qd0.copy(), activations, lower, upper, soft))
+        result = self.law.solve(LawProblem(tasks, qd0.copy(), activations, lower, upper, soft))
         status, messages, command = self._inside(checked_velocity(result, self._q, self.dt), box)
         if result.status != "solved":
             status, messages = DEGRADED, (*messages, f"law: {result.status}")
@@ -241,7 +238,7 @@ class SafetyController:
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
         regime, switches = self.activation.regime(cdf_n), self.activation.switches(cdf_n)
-        errors = self._errors(commanded)
+        errors = tuple([clik.error for clik in wanted]) if self.recovery.on_path else self._errors(commanded)
         self._advance(command)
         return Tick(
             reference=self._reference(),
@@ -268,12 +265,14 @@ class SafetyController:
     def _inside(self, qd: NDArray[np.float64], box: Box | None) -> tuple[str, tuple[str, ...], NDArray[np.float64]]:
         """The law's velocity, clipped to the box where it knew no limits, with status and messages."""
         if box is None:
-            return OK, (), qd
-        command = box.clip(qd)
+            return OK, (), qd.copy()
+        command, excess = box.admit(qd)
+        if excess <= 1e-9:
+            return OK, (), command
         messages = box.notes(self.robot.joint_names)
-        excess = np.abs(command - qd)
-        if excess.max() > 1e-9:
-            names = [name for name, e in zip(self.robot.joint_names, excess, strict=True) if e > 1e-9]
+        beyond = np.abs(command - qd)
+        if beyond.max() > 1e-9:
+            names = [name for name, e in zip(self.robot.joint_names, beyond, strict=True) if e > 1e-9]
             messages = (*messages, "the law exceeded the limits, clipped: " + ", ".join(names))
         return (DEGRADED if messages else OK), messages, command
 

@@ -8,20 +8,20 @@ it non-empty at the next tick, so a law that respects it never meets an infeasib
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 
 #: Kinds of limits by their code; 0 stands for none.
 KINDS = ("", "position", "velocity", "acceleration", "jerk")
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(NamedTuple):
     """Admissible joint velocities of one tick.
 
     Attributes:
@@ -42,6 +42,11 @@ class Box:
     def clip(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
         """The nearest velocity inside the box; `qd` must be finite."""
         return np.minimum(np.maximum(qd, self.lower), self.upper)
+
+    def admit(self, qd: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """The nearest velocity inside the box, and by how much `qd` was outside, at most; NaN if a limit gave way."""
+        admitted = np.empty(len(qd))
+        return admitted, _admit(qd, self.lower, self.upper, self.sacrificed, admitted)
 
     def binding(self, qd: NDArray[np.float64], names: tuple[str, ...], tolerance: float = 1e-9) -> tuple[str, ...]:
         """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``."""
@@ -118,12 +123,12 @@ class JointLimits:
             A box with lower <= upper, whatever the state.
         """
         bounds = np.empty((2, len(q)))
-        kinds = np.zeros((3, len(q)), dtype=np.int64)
+        kinds = np.empty((3, len(q)), dtype=np.int64)
         limits = (self.lower, self.upper, self.max_velocity, self.max_acceleration)
         _box(q, qd, *limits, self.dt, self.return_speed, bounds, kinds)
         if self.max_jerk is not None:
             _limit_jerk(qd, np.zeros_like(qd) if qdd is None else qdd, self.max_jerk, self.dt, bounds, kinds)
-        return Box(bounds[0], bounds[1], kinds[0], kinds[1], kinds[2])
+        return Box(*bounds, *kinds)
 
 
 def _numbers(key: str, value: ArrayLike, ndim: int = 1) -> NDArray[np.float64]:
@@ -137,7 +142,7 @@ def _numbers(key: str, value: ArrayLike, ndim: int = 1) -> NDArray[np.float64]:
     return array
 
 
-@njit("float64(float64, float64, float64)", cache=True)
+@entry(types.float64(types.float64, types.float64, types.float64))
 def stopping_speed(s: float, a: float, dt: float) -> float:
     """Largest speed that, reduced by a dt each tick, has stopped after at most the distance s >= 0.
 
@@ -151,7 +156,7 @@ def stopping_speed(s: float, a: float, dt: float) -> float:
     return a * dt * (n + 0.5 * k * (k + 1.0)) / (k + 1.0)
 
 
-@njit(cache=True)
+@inline
 def _position_bound(s, a, dt, return_speed):  # type: ignore[no-untyped-def]
     """Highest speed towards a position limit at distance s; negative, i.e. away from it, where it was passed."""
     if s >= 0.0:
@@ -159,7 +164,10 @@ def _position_bound(s, a, dt, return_speed):  # type: ignore[no-untyped-def]
     return -min(-s / dt, return_speed)
 
 
-@njit(cache=True)
+_read, _bounds, _kinds = readable(1), types.float64[:, ::1], types.int64[:, ::1]
+
+
+@entry(types.void(*[_read] * 6, types.float64, types.float64, _bounds, _kinds))
 def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  # type: ignore[no-untyped-def]
     """Fill bounds (2, n) with lower and upper speeds, kinds (3, n) with the codes of Box; one joint at a time."""
     for i in range(len(q)):
@@ -192,7 +200,17 @@ def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  #
         kinds[0, i], kinds[1, i], kinds[2, i] = kind_lo, kind_hi, sacrificed
 
 
-@njit(cache=True)
+@entry(types.float64(_read, _read, _read, types.Array(types.int64, 1, "A", readonly=True), types.float64[::1]))
+def _admit(qd, lower, upper, sacrificed, admitted):  # type: ignore[no-untyped-def]
+    excess = 0.0
+    for i in range(len(qd)):
+        admitted[i] = min(max(qd[i], lower[i]), upper[i])
+        excess += np.nan if sacrificed[i] else 0.0
+        excess = max(abs(admitted[i] - qd[i]), excess) if excess == excess else excess
+    return excess
+
+
+@entry(types.void(*[_read] * 3, types.float64, _bounds, _kinds))
 def _limit_jerk(qd, qdd, jerk, dt, bounds, kinds):  # type: ignore[no-untyped-def]
     """Narrow the box to |q̈ - q̈_last| <= jerk dt where that leaves something, else to its nearest point."""
     for i in range(len(qd)):

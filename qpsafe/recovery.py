@@ -6,93 +6,22 @@ following ──danger above Δ(1-ε)──> suspended ──danger below──>
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
+from qpsafe.returns import RecoveryRules, Return, minimum_jerk, run_out
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
+__all__ = ["FOLLOWING", "RECOVERING", "SUSPENDED", "Recovery", "RecoveryRules", "minimum_jerk", "run_out"]
+
 FOLLOWING, SUSPENDED, RECOVERING = "following", "suspended", "recovering"
-
-
-@dataclass(frozen=True)
-class RecoveryRules:
-    """How the robot returns to its path, and when it counts as returned.
-
-    Attributes:
-        speed, angular_speed, joint_speed: Peak speed of a return from rest [m/s], [rad/s], [rad/s]; what is left of the
-            evasive motion, at most as fast, runs out on top of it.
-        shortest: Least duration of a return [s], so that small ones stay gentle.
-        tolerance: Largest error norm at which a task counts as met [m or rad].
-        ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
-        enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
-
-    Raises:
-        ConfigurationError: A value is not a finite number > 0.
-    """
-
-    speed: float = 0.25
-    angular_speed: float = 0.8
-    joint_speed: float = 0.8
-    shortest: float = 0.4
-    tolerance: float = 5e-4
-    ramp: float = 0.2
-    enabled: bool = True
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name != "enabled" and not (isinstance(value, int | float) and 0.0 < value < math.inf):
-                raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
-
-    def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
-        """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
-        if joints:
-            mean = float(np.abs(offset).max()) / self.joint_speed
-        else:
-            shift, turn = float(np.linalg.norm(offset[:3])), float(np.linalg.norm(offset[3:]))
-            mean = max(shift / self.speed, turn / self.angular_speed)
-        return max(15.0 / 8.0 * mean, self.shortest)
-
-    def slowed(self, rate: NDArray[np.float64], joints: bool) -> NDArray[np.float64]:
-        """The rate of an offset (6,) or (n,), no faster than a return."""
-        if joints:
-            return rate * min(1.0, self.joint_speed / max(float(np.abs(rate).max()), 1e-12))
-        linear, angular = max(float(np.linalg.norm(rate[:3])), 1e-12), max(float(np.linalg.norm(rate[3:])), 1e-12)
-        scale = min(1.0, self.speed / linear), min(1.0, self.angular_speed / angular)
-        return np.concatenate((scale[0] * rate[:3], scale[1] * rate[3:]))
-
-
-@dataclass(frozen=True, eq=False)
-class Return:
-    """The way back of one task: its offset from the reference, which fades by minimum jerk from the task's own speed.
-
-    Attributes:
-        offset: At the start (6,) or (n,).
-        speed: Rate of the offset at the start (6,) or (n,).
-        duration: [s].
-        time: Since the start [s].
-    """
-
-    offset: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    duration: float
-    time: float = 0.0
-
-    def displace(self, sample: Any) -> Any:
-        """The reference with what is left of the offset."""
-        T = self.duration
-        s, ds = minimum_jerk(self.time / T)
-        r, dr = run_out(self.time / T)
-        return sample.displaced((1.0 - s) * self.offset + r * T * self.speed, -ds / T * self.offset + dr * self.speed)
 
 
 class Recovery:
@@ -172,23 +101,29 @@ class Recovery:
         Raises:
             ValueError: A trajectory is not finite; the phase stays as it was.
         """
-        values = [task.value(state) for task in self.tasks]
-        self._next_phase(cdf_n, values, activations)
-        return tuple(
-            self._reference(k, value, active) for k, (value, active) in enumerate(zip(values, activations, strict=True))
-        )
+        self._next_phase(cdf_n, state, activations)
+        if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
+            return tuple([task.trajectory.sample(self.path_time) for task in self.tasks])
+        return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
+
+    @property
+    def on_path(self) -> bool:
+        """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
+        return self.phase == SUSPENDED or True not in self._pending
 
     def take_events(self) -> tuple[str, ...]:
         """Names of the events that the path has passed since they were last taken, each once, in their order."""
+        if not self._cursors:
+            return ()
         found: list[tuple[float, str]] = []
         for cursor in self._cursors:
             found.extend(cursor.take(self.path_time))
         return tuple(name for _, name in sorted(found, key=lambda event: event[0]))
 
-    def _next_phase(self, cdf_n: float, values: list, activations: tuple[float, ...]) -> None:
+    def _next_phase(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> None:
         if self._changed:
             self._changed = False
-            if self.phase == FOLLOWING and not self._met(values, (1.0,) * len(values)):
+            if self.phase == FOLLOWING and not self._met(state, (1.0,) * len(self.tasks)):
                 self._suspend()
         if not cdf_n <= self.suspend_above and self.rules.enabled:
             self._suspend()
@@ -198,32 +133,34 @@ class Recovery:
                     raise ValueError(f"the trajectory of the {task.name} task is not finite")
             self.phase = RECOVERING
         elif self.phase == RECOVERING:
-            if self._returned(activations) and self._met(values, activations):
+            if self._returned(activations) and self._met(state, activations):
                 self.phase = FOLLOWING
         else:
-            self._advance(values)
+            self._advance(state)
 
     def _suspend(self) -> None:
         self.phase, self._rate = SUSPENDED, 0.0
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
 
-    def _advance(self, values: list) -> None:
+    def _advance(self, state: RobotState) -> None:
         """Let the clock run, at an event only when the tasks are met: no grip beside the part."""
         step = self.dt / self.rules.ramp
         self._rate = max(self._rate - step, 0.0) if self.paused else min(self._rate + step, 1.0)
         ahead = self.path_time + self._rate * self.dt
-        if any(cursor.due(ahead) for cursor in self._cursors) and not self._met(values, (1.0,) * len(values)):
-            return
+        for cursor in self._cursors:
+            if cursor.due(ahead) and not self._met(state, (1.0,) * len(self.tasks)):
+                return
         self.path_time = ahead
 
-    def _reference(self, k: int, value: NDArray[np.float64], active: float) -> Any:
+    def _reference(self, k: int, state: RobotState, active: float) -> Any:
         task = self.tasks[k]
         sample = task.trajectory.sample(self.path_time)
         if self.phase != FOLLOWING or self._rate < 1.0:
             sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
         if not self._pending[k]:
             return sample
+        value = task.value(state)
         if self.phase == SUSPENDED:
             self._offsets[k] = sample.offset(value) if sample.finite else None
             return sample
@@ -251,11 +188,11 @@ class Recovery:
     def _returned(self, activations: tuple[float, ...]) -> bool:
         return not any(pending and active >= 1.0 for pending, active in zip(self._pending, activations, strict=True))
 
-    def _met(self, values: list, activations: tuple[float, ...]) -> bool:
+    def _met(self, state: RobotState, activations: tuple[float, ...]) -> bool:
         """Whether every essential and fully active task is on the path, within the tolerance."""
-        for task, value, active in zip(self.tasks, values, activations, strict=True):
+        for task, active in zip(self.tasks, activations, strict=True):
             if task.essential and active >= 1.0:
-                error = task.error(value, task.trajectory.sample(self.path_time))
+                error = task.error(task.value(state), task.trajectory.sample(self.path_time))
                 if not float(np.linalg.norm(error)) <= self.rules.tolerance:
                     return False
         return True
@@ -281,15 +218,3 @@ class _Cursor:
             found.append((event.time, event.name))
             self.count += 1
         return found
-
-
-def minimum_jerk(tau: float) -> tuple[float, float]:
-    """s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ and ds/dτ for τ in [0, 1]: from rest to rest."""
-    tau = min(max(tau, 0.0), 1.0)
-    return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2
-
-
-def run_out(tau: float) -> tuple[float, float]:
-    """r(τ) = τ - 6 τ³ + 8 τ⁴ - 3 τ⁵ and dr/dτ for τ in [0, 1]: from speed 1 to rest where it began, as smoothly."""
-    tau = min(max(tau, 0.0), 1.0)
-    return tau - tau**3 * (6.0 - 8.0 * tau + 3.0 * tau**2), 1.0 - tau**2 * (18.0 - 32.0 * tau + 15.0 * tau**2)

@@ -49,6 +49,8 @@ class FrameTask(PoseTask):
         shift = sample.pose[:3, 3] - value[:3, 3]
         return np.concatenate((shift, log3(sample.pose[:3, :3] @ value[:3, :3].T)))[self._rows]
 
+    clik = PoseTask.compiled_clik
+
 
 class RelativeFrameTask(FrameTask):
     """Keep a frame on a trajectory that is given in another frame of the robot, e.g. the tool as seen from the elbow.

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.tasks.clik import Clik
 from qpsafe.tasks.rotation import euler_difference, euler_zyx, euler_zyx_rates, log3
-from qpsafe.tasks.task import PoseTask
+from qpsafe.tasks.task import PoseTask, Task
 from qpsafe.tasks.trajectory import Sample, Trajectory
 
 if TYPE_CHECKING:
@@ -60,3 +61,7 @@ class OrientationTask(PoseTask):
         if self.form == "euler":
             return euler_zyx_rates(sample.pose[:3, :3]) @ sample.twist[3:] + self.gain * error
         return super().velocity(error, sample)
+
+    def clik(self, state: RobotState, sample: Sample) -> Clik:
+        """See `Task.clik`."""
+        return Task.clik(self, state, sample) if self.form == "euler" else self.compiled_clik(state, sample)

@@ -27,3 +27,5 @@ class PositionTask(PoseTask):
     def error(self, value: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """x_d - x (3,) [m]."""
         return sample.pose[:3, 3] - value[:3, 3]
+
+    clik = PoseTask.compiled_clik

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.tasks.clik import Clik, pose_clik
 from qpsafe.tasks.trajectory import Sample, Trajectory
 
 if TYPE_CHECKING:
@@ -69,6 +70,20 @@ class Task(ABC):
     def velocity(self, error: NDArray[np.float64], sample: Any) -> NDArray[np.float64]:
         """CLIK velocity ẋ_d + K e, (rows,)."""
 
+    def clik(self, state: RobotState, sample: Any) -> Clik:
+        """Jacobian, CLIK velocity and error at a configuration.
+
+        Built-in tasks compute them in one compiled call; a class derived from them that redefines one of the methods
+        above comes back to this.
+        """
+        error = self.error(self.value(state), sample)
+        return Clik(self.jacobian(state), self.velocity(error, sample), error)
+
+    def __init_subclass__(cls) -> None:
+        own = vars(cls)
+        if "clik" not in own and any(key in own for key in ("value", "error", "jacobian", "velocity")):
+            cls.clik = Task.clik  # type: ignore[method-assign]
+
     def misfit(self, robot: Robot) -> Misfit | None:
         """Why `robot` cannot do this task, None if it can."""
         for frame in self.frames:
@@ -94,6 +109,7 @@ class PoseTask(Task):
         self.frame = frame
         self.frames = (frame,)
         first, last = self.rows[0], self.rows[-1]
+        self._numbers = np.array(self.rows, dtype=np.int64)
         contiguous = self.rows == tuple(range(first, last + 1))
         self._rows = slice(first, last + 1) if contiguous else list(self.rows)  # a slice is the quicker one
 
@@ -108,3 +124,8 @@ class PoseTask(Task):
     def velocity(self, error: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """CLIK velocity ẋ_d + K e, (rows,)."""
         return sample.twist[self._rows] + self.gain * error
+
+    def compiled_clik(self, state: RobotState, sample: Sample) -> Clik:
+        """`clik` in one compiled call, for e = rows of (x_d - x, log(R_d Rᵀ))."""
+        quick = pose_clik(state, self.frame, self._numbers, self.gain, sample)
+        return Task.clik(self, state, sample) if quick is None else quick

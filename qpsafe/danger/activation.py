@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -35,12 +36,12 @@ class Threshold:
         if not (0.0 < self.epsilon < 1.0):
             raise ConfigurationError("Threshold", "epsilon", self.epsilon, "a number strictly between 0 and 1")
 
-    @property
+    @cached_property
     def start(self) -> float:
         """Δ(1-ε): the release begins above it."""
         return self.delta * (1.0 - self.epsilon)
 
-    @property
+    @cached_property
     def end(self) -> float:
         """Δ(1+ε): the release is complete from here on."""
         return self.delta * (1.0 + self.epsilon)
@@ -96,7 +97,7 @@ class Activation:
 
     def switches(self, cdf_n: float) -> tuple[float, ...]:
         """The switches (m, f, ...) of eqs. (19), (21), one per level of danger, each in [0, 1]."""
-        return tuple(threshold(cdf_n) for threshold in self.levels)
+        return tuple([threshold(cdf_n) for threshold in self.levels])
 
     def activations(self, cdf_n: float) -> tuple[float, ...]:
         """Activations a_1..a_N = products of the first switches: (m, m f, ...); (m, m, m f, m f) for two and two."""
@@ -109,7 +110,7 @@ class Activation:
 
     def kept(self, cdf_n: float) -> int:
         """Number of tasks not yet being released: N in low danger, 0 in high danger."""
-        return sum(1 for threshold in self.thresholds if cdf_n <= threshold.start)
+        return sum([cdf_n <= threshold.start for threshold in self.thresholds])
 
     def regime(self, cdf_n: float) -> str:
         """Name of the danger level (Table I): ``low``, ``medium`` or ``high``.
@@ -117,7 +118,7 @@ class Activation:
         A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two different
         thresholds the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
         """
-        n, kept = len(self.levels), sum(1 for threshold in self.levels if cdf_n <= threshold.start)
+        n, kept = len(self.levels), sum([cdf_n <= threshold.start for threshold in self.levels])
         if n in REGIME_NAMES:
             return REGIME_NAMES[n][kept]
         return "high" if kept == 0 else "low" if kept == n else f"medium-{kept}"

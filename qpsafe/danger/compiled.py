@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
 from typing import Any
+from zlib import crc32
 
 import numba
 import numpy as np
@@ -22,16 +25,32 @@ inline = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
 
-def entry(signature: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Compile for one signature at import, from numba's cache where this machine has a place for one."""
+def entry(signature: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compile for one signature at import, from numba's cache where this machine has a place for one.
 
-    def compiled(function: Callable[..., None]) -> Callable[..., None]:
+    Args:
+        signature: Types of arguments and result.
+        uses: Other modules whose compiled code goes into this one. numba's cache notices changes of the entry's own
+            file only; so the name it is kept under tells the state of these.
+    """
+
+    def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+        if uses:
+            function.__qualname__ += f"_{checksum(*uses):08x}"
         try:
             return numba.njit(signature, cache=True, no_cfunc_wrapper=True, **OPTIONS)(function)
         except RuntimeError:  # no directory that numba may write to
             return numba.njit(signature, no_cfunc_wrapper=True, **OPTIONS)(function)
 
     return compiled
+
+
+def checksum(*modules: ModuleType) -> int:
+    """Of the sources of modules."""
+    try:
+        return crc32(b"".join(Path(str(module.__file__)).read_bytes() for module in modules))
+    except OSError:  # installed without sources
+        return 0
 
 
 def readable(ndim: int) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import entry, readable
+from qpsafe.danger.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -60,15 +60,28 @@ def _sum_by_link(vectors, links, total):  # type: ignore[no-untyped-def]
             total[links[k], c] += vectors[k, c]
 
 
+@inline
+def act(force: Vector, J0: Array, J1: Array, torque: Array) -> None:
+    """Add the torque of a force at both ends of a link; J0, J1 (3, n) are their linear Jacobians."""
+    for c in range(3):
+        if force[c] != 0.0:
+            for j in range(torque.shape[0]):
+                # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
+                torque[j] += (J0[c, j] + J1[c, j]) * force[c]
+
+
 @entry(types.void(readable(3), _links, _links, readable(2), types.float64[::1]))
 def _torque(J, starts, stops, forces, torque):  # type: ignore[no-untyped-def]
     for i in range(len(starts)):
-        for c in range(3):
-            force = forces[i, c]
-            if force != 0.0:
-                for j in range(len(torque)):
-                    # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
-                    torque[j] += (J[starts[i], c, j] + J[stops[i], c, j]) * force
+        act(row(forces, i), J[starts[i]], J[stops[i]], torque)
+
+
+@entry(types.void(readable(2), readable(2), readable(1), readable(1), types.float64[::1]))
+def _filter(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
+    for i in range(len(before)):
+        after[i] = 0.0
+        for j in range(len(before)):
+            after[i] += A[i, j] * before[j] + B[i, j] * sigma[j]
 
 
 class Evasion:
@@ -98,8 +111,10 @@ class Evasion:
 
     def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
         """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s]."""
-        self.velocity = self._A @ self.velocity + self._B @ sigma
-        return self.velocity
+        velocity = np.empty(len(self.velocity))
+        _filter(self._A, self._B, self.velocity, sigma, velocity)
+        self.velocity = velocity
+        return velocity
 
     def reset(self) -> None:
         """Forget the past: q̇0 = 0."""

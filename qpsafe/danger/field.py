@@ -23,7 +23,7 @@ _RANGES = {  # attribute: (least, what is expected)
 
 __all__ = ["DangerField", "danger_vectors"]
 
-_AT_REST = np.empty((0, 3))  # no velocities: points at rest
+AT_REST = np.empty((0, 3))  # no velocities: points at rest
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class DangerField:
             ConfigurationError: an array has a wrong shape.
         """
         p = rows(points, "points", None)
-        moving = _AT_REST if point_velocities is None else rows(point_velocities, "point_velocities", len(p))
+        moving = AT_REST if point_velocities is None else rows(point_velocities, "point_velocities", len(p))
         r0, r1, v0, v1 = wire
         r0 = rows(r0, "wire.starts", None)
         r1 = rows(r1, "wire.ends", len(r0))

@@ -12,7 +12,7 @@ entry's own file only.
 
 from __future__ import annotations
 
-from math import atan2, copysign, isfinite, log, log1p, nan, pi, sqrt
+from math import atan2, copysign, inf, isfinite, log, log1p, nan, pi, sqrt
 
 import numpy as np
 from numba import types
@@ -56,38 +56,42 @@ def _speed_potential(lam: float, lam1: float, mu: float, Q: Vector, V0: float, V
     z = λ + iμ, lam1 = λ - 1, Q = (|vλ|², vλ·δ, α) with vλ = v0 + λδ, α = |δ|². L² K2 = Im Φ/μ = F + A.
     """
     c, b, alpha = Q
-    z, z1 = complex(lam, mu), complex(lam1, mu)
     zz, zz1 = lam * lam + mu * mu, lam1 * lam1 + mu * mu
     # ζ² = |vλ|² - μ²α + 2iμ vλ·δ = |v_l|² continued to l = z; ζ is the root on the side of X = V1 z + V0 (z-1)
     re, im = c - mu * mu * alpha, 2.0 * mu * b
     modulus = sqrt(re * re + im * im)
     major = sqrt(0.5 * (modulus + abs(re)))
     minor = 0.5 * im / major if major > 0.0 else 0.0
-    zeta = complex(major, minor) if re >= 0.0 else complex(abs(minor), copysign(major, im))
-    X = V1 * z + V0 * z1
-    if X.real * zeta.real + X.imag * zeta.imag < 0.0:
-        zeta = -zeta
-    Y = X + zeta
-    XX, YY = X.real * X.real + X.imag * X.imag, Y.real * Y.real + Y.imag * Y.imag
+    zr, zi = (major, minor) if re >= 0.0 else (abs(minor), copysign(major, im))
+    Xr, Xi = V1 * lam + V0 * lam1, (V0 + V1) * mu
+    if Xr * zr + Xi * zi < 0.0:
+        zr, zi = -zr, -zi
+    Yr, Yi = Xr + zr, Xi + zi
+    XX, YY = Xr * Xr + Xi * Xi, Yr * Yr + Yi * Yi
     # Ψ = Log f - Log g with f = 2 Dv (z-1)/Y, g = Y/z: one logarithm and one angle, on the sheet of the two logs
-    f, g = z1 * Y.conjugate(), Y * z.conjugate()
-    fg = f * g.conjugate()
-    angle = atan2(fg.imag, fg.real)
-    if f.imag > 0.0 and g.imag < 0.0 and angle < 0.0:
+    fr, fi = lam1 * Yr + mu * Yi, mu * Yr - lam1 * Yi  # (z-1) Ȳ
+    gr, gi = lam * Yr + mu * Yi, lam * Yi - mu * Yr  # Y z̄
+    angle = atan2(fi * gr - fr * gi, fr * gr + fi * gi)
+    if fi > 0.0 and gi < 0.0 and angle < 0.0:
         angle += 2.0 * pi
-    elif f.imag < 0.0 and g.imag > 0.0 and angle > 0.0:
+    elif fi < 0.0 and gi > 0.0 and angle > 0.0:
         angle -= 2.0 * pi
-    psi = complex(log(2.0 * Dv * sqrt(zz * zz1) / YY), angle)
-    # I = ∫ dl/((l-z) |v_l|) = Ψ/ζ = -2 artanh(ζ/X)/ζ; 1/X = conj(X)/|X|², since numba's complex division may raise
+    size = log(2.0 * Dv * sqrt(zz * zz1) / YY)
+    # I = ∫ dl/((l-z) |v_l|) = Ψ/ζ = -2 artanh(ζ/X)/ζ
     if modulus < 1e-6 * XX:
-        r = X.conjugate() * (1.0 / XX)
+        r = complex(Xr, -Xi) * (1.0 / XX)  # 1/X
+        zeta = complex(zr, zi)
         I = -2.0 * r * (1.0 + (zeta * r) * (zeta * r) * (1.0 / 3.0))
+        Ir, Ii = I.real, I.imag
     else:
-        I = psi * zeta.conjugate() * (1.0 / modulus)
+        r0 = 1.0 / modulus
+        Ir, Ii = (size * zr + angle * zi) * r0, (angle * zr - size * zi) * r0
     # ∂F/∂λ = Im Φ'/μ, ∂F/∂μ = (Re Φ' - A - F)/μ with Φ' - A = (vλ·δ + iμα) I + V1/(z-1) - V0/z
-    slope = complex(b, mu * alpha) * I + z1.conjugate() * (V1 / zz1) - z.conjugate() * (V0 / zz)
-    F = (complex(re, im) * I).imag / mu
-    return F, slope.imag / mu, (slope.real - F) / (mu * mu)
+    n0, n1, m = V0 / zz, V1 / zz1, 1.0 / mu
+    F = (re * Ii + im * Ir) * m
+    axial = b * Ii * m + alpha * Ir - n1 + n0
+    radial = (b * Ir - mu * alpha * Ii + n1 * lam1 - n0 * lam - F) * m * m
+    return F, axial, radial
 
 
 @inline
@@ -96,35 +100,37 @@ def _near(w0: Vector, w1: Vector, d: Vector, motion: Motion, k: Vector) -> tuple
     speed, v0, v1, delta, V0, V1, alpha, Dv, A = motion
     k1, k2, gamma = k[0], k[1] * speed, k[2]
     L, R0, R1 = sqrt(dot(d, d)), sqrt(dot(w0, w0)), sqrt(dot(w1, w1))
-    u, sigma = scale(1.0 / L, d), R0 + R1
+    iL, i0, i1 = 1.0 / L, 1.0 / R0, 1.0 / R1
+    u, sigma = scale(iL, d), R0 + R1
     t0, t1 = -dot(w0, u), -dot(w1, u)
     wn = add(w0, t0, u) if R0 < R1 else add(w1, t1, u)  # w⊥, from the nearer end
     hh, ww = dot(wn, wn), dot(w0, w1)
-    # D = R0 R1 + w0·w1 and e = ŵ0 + ŵ1, without cancellation
+    # D = R0 R1 + w0·w1 and e = ŵ0 + ŵ1 = w⊥ σ/(R0 R1) - u (t0+t1) D/(R0 R1 σ), without cancellation
     D = R0 * R1 + ww if ww >= 0.0 else L * L * hh / (R0 * R1 - ww)
-    e = add(scale(sigma / (R0 * R1), wn), -(t0 + t1) * D / (R0 * R1 * sigma), u)
+    iD, i01 = 1.0 / D, i0 * i1
+    e = add(scale(sigma * i01, wn), -(t0 + t1) * D * i01 / sigma, u)
     # S = log1p(L (σ+L)/D)/L, ∇S = -e/D
-    S = log1p(L * (sigma + L) / D) / L
-    dS = scale(-1.0 / D, e)
+    S = log1p(L * (sigma + L) * iD) * iL
+    dS = scale(-iD, e)
     if k2 == 0.0:
         return k1 * S, scale(k1, dS)
     # rigid part of K1, with v1 less the stretching s u, s = δ·u: K1 = (v0·e + δ·w⊥/R1)/D
     s = dot(delta, u)
-    n0, n1, v1r = scale(1.0 / R0, w0), scale(1.0 / R1, w1), add(v1, -s, u)
-    K1 = (dot(v0, e) + dot(delta, wn) / R1) / D
+    n0, n1, v1r = scale(i0, w0), scale(i1, w1), add(v1, -s, u)
+    K1 = (dot(v0, e) + dot(delta, wn) * i1) * iD
     # ∇K1 = [(v0 - (v0·ŵ0)ŵ0)/R0 + (v1 - (v1·ŵ1)ŵ1)/R1 - K1 σ e]/D
-    dK1 = add(scale(1.0 / R0, add(v0, -dot(v0, n0), n0)), 1.0 / R1, add(v1r, -dot(v1r, n1), n1))
-    dK1 = scale(1.0 / D, add(dK1, -K1 * sigma, e))
+    dK1 = add(scale(i0, add(v0, -dot(v0, n0), n0)), i1, add(v1r, -dot(v1r, n1), n1))
+    dK1 = scale(iD, add(dK1, -K1 * sigma, e))
     # stretching part (prismatic joints): s ∫ l (w·u)/R³ dl = s (1/R1 - S)/L
-    K1 += s * (1.0 / R1 - S) / L
-    dK1 = add(dK1, -s / L, add(dS, 1.0 / (R1 * R1), n1))
+    K1 += s * (i1 - S) * iL
+    dK1 = add(dK1, -s * iL, add(dS, i1 * i1, n1))
 
     # K2 = (A + F)/L²
-    lam, lam1, mu = -t0 / L, -t1 / L, max(sqrt(hh) / L, 1e-12)
+    lam, lam1, mu = -t0 * iL, -t1 * iL, max(sqrt(hh) * iL, 1e-12)
     vl = add(v0, lam, delta)
     Q = (dot(vl, vl), dot(vl, delta), alpha)
     F, axial, radial = _speed_potential(lam, lam1, mu, Q, V0, V1, Dv)
-    K2 = (A + F) / (L * L)
+    K2 = (A + F) * iL * iL
     # by the axis, outside the link, digits of ∂F/∂μ cancel: extrapolate from μ' and 2μ' by its series in μ²
     off = 3e-3 * min(abs(lam), abs(lam1))
     if mu < off and lam * lam1 > 0.0:
@@ -132,7 +138,8 @@ def _near(w0: Vector, w1: Vector, d: Vector, motion: Motion, k: Vector) -> tuple
         twice = _speed_potential(lam, lam1, 2.0 * off, Q, V0, V1, Dv)[2]
         radial = once + (once - twice) * (1.0 - (mu / off) ** 2) / 3.0
     # ∇K2 = [u ∂F/∂λ + (w⊥/h) ∂F/∂μ]/L³
-    dK2 = add(scale(axial / L**3, u), radial / L**4, wn)
+    iL3 = iL * iL * iL
+    dK2 = add(scale(axial * iL3, u), radial * iL3 * iL, wn)
     gradient = add(scale(k1, dS), k2, add(dK1, gamma, dK2))
     return k1 * S + k2 * (gamma * K2 + K1), gradient
 
@@ -178,6 +185,17 @@ def _far(w0: Vector, w1: Vector, d: Vector, motion: Motion, k: Vector) -> tuple[
 
 
 @inline
+def _point(w: Vector, motion: Motion, k: Vector) -> tuple[float, Vector]:
+    """Value and gradient of a link of length zero that moves as one: the integrands themselves; k = (k1, k2, gamma)."""
+    v, V, k2 = motion[1], motion[4], k[1] * motion[0]
+    q = 1.0 / dot(w, w)
+    r = sqrt(q)
+    static, along, swift = k[0] * r, k2 * dot(v, w) * q * r, k2 * k[2] * V * q
+    # ∇(1/R) = -w/R³, ∇(v·w/R³) = v/R³ - 3 (v·w) w/R⁵, ∇(1/R²) = -2w/R⁴
+    return static + along + swift, add(scale(-q * (static + 3.0 * along + 2.0 * swift), w), k2 * q * r, v)
+
+
+@inline
 def _any_normal(d: Vector, v: Vector) -> Vector:
     """Return a vector normal to the link d: where it moves to, the worst side; if it does not, any normal."""
     dd = dot(d, d)
@@ -204,6 +222,8 @@ def _link(p: Vector, r0: Vector, r1: Vector, motion: Motion, k: Vector, floor: f
             n = add(n, -dot(n, d) / dd, d)
         n = scale(floor / sqrt(dot(n, n)), n)
         w0, w1 = add(n, l, d), add(n, l - 1.0, d)
+    if dd < 1e-18 * dot(w0, w0) < inf and motion[6] < 1e-18:  # errors below 1e-18
+        return _point(add(w0, -0.5, d), motion, k)
     if sqrt(dd) < FAR * (sqrt(dot(w0, w0)) + sqrt(dot(w1, w1))):
         return _far(w0, w1, d, motion, k)
     return _near(w0, w1, d, motion, k)

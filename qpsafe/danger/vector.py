@@ -7,18 +7,24 @@ from math import sqrt
 import numpy as np
 from numba import types
 
-from qpsafe.danger.compiled import Array, dot, entry, readable, row, rows, scale
+from qpsafe.danger.compiled import Array, Vector, dot, entry, inline, readable, row, rows, scale
+
+
+@inline
+def vector_of(value: float, gradient: Array, j: int) -> Vector:
+    """(6) at point j."""
+    g = row(gradient, j)
+    size = abs(g[0]) + abs(g[1]) + abs(g[2])
+    if size != 0.0:  # true for NaN
+        g = scale(1.0 / size, g)  # |g|² neither overflows nor vanishes
+        g = scale(value / sqrt(dot(g, g)), g)
+    return g
 
 
 @entry(types.void(readable(1), readable(2), types.float64[:, ::1]))
 def _vector_field(value: Array, gradient: Array, vector: Array) -> None:
     for j in range(gradient.shape[0]):
-        g = row(gradient, j)
-        size = abs(g[0]) + abs(g[1]) + abs(g[2])
-        if size != 0.0:  # true for NaN
-            g = scale(1.0 / size, g)  # |g|² neither overflows nor vanishes
-            g = scale(value[j] / sqrt(dot(g, g)), g)
-        vector[j, 0], vector[j, 1], vector[j, 2] = g
+        vector[j, 0], vector[j, 1], vector[j, 2] = vector_of(value[j], gradient, j)
 
 
 def danger_vectors(value: Array, gradient: Array) -> Array:

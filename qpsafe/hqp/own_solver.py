@@ -22,14 +22,14 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def _read(dimensions: int) -> Any:
+def read(dimensions: int) -> Any:
     """Type of an array to read, read-only or not, so that nothing is ever compiled a second time."""
     return types.Array(types.float64, dimensions, "C", readonly=True)
 
 
 _SIGNATURE = types.void(
     types.float64[::1], types.int64[::1], types.int64, types.float64[::1], types.int64[::1],
-    _read(2), _read(1), _read(1), _read(1), _read(1).copy(dtype=types.int64), _read(1), _read(1),
+    read(2), read(1), read(1), read(1), read(1).copy(dtype=types.int64), read(1), read(1),
     types.boolean, types.float64,
 )  # fmt: skip
 
@@ -53,7 +53,7 @@ def _compile(key: int) -> Callable[..., None]:
     without the key it would go on using what it compiled before another file changed.
     """
 
-    def solve(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping):  # type: ignore[no-untyped-def]
+    def solve_one(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping):  # type: ignore[no-untyped-def]
         if key >= 0:
             run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping)
 
@@ -61,14 +61,15 @@ def _compile(key: int) -> Callable[..., None]:
     notice.daemon = True
     notice.start()
     try:
-        return numba.njit(_SIGNATURE, cache=True, **own_linear.OPTIONS)(solve)
+        return numba.njit(_SIGNATURE, cache=True, **own_linear.OPTIONS)(solve_one)
     except RuntimeError:  # no directory that numba may write to
-        return numba.njit(_SIGNATURE, **own_linear.OPTIONS)(solve)
+        return numba.njit(_SIGNATURE, **own_linear.OPTIONS)(solve_one)
     finally:
         notice.cancel()
 
 
-_solve = _compile(_sources())
+SOURCES = _sources()
+solve = _compile(SOURCES)
 _NO_WEIGHTS = np.empty(0)
 _memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}
 
@@ -115,5 +116,5 @@ def solve_packed(
     x = np.zeros(n)
     info = np.zeros(HEADER + n + A.shape[0], np.int64)
     weights = _NO_WEIGHTS if weight is None else weight
-    _solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, damping)
+    solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, damping)
     return x, info

@@ -62,9 +62,13 @@ class State(NamedTuple):
 
 def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
     """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level."""
+    return np.zeros(floats_of(n, rows, m)), np.zeros(2 * (n + rows + 2 * n) + n + m + n + 1, np.int64)
+
+
+def floats_of(n: int, rows: int, m: int) -> int:
+    """How many floats `workspace` has, exactly."""
     rows, m = rows + 2 * n, m + n  # the closing identity, and rows that damping adds
-    floats = rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 3 * n
-    return np.zeros(floats), np.zeros(2 * (n + rows) + n + m + 1, np.int64)
+    return rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 3 * n
 
 
 @jit

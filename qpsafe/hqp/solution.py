@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -54,19 +55,23 @@ class Solution:
         iterations: int,
         solver: str,
         solve_time: float,
-        problem: Packed,
+        problem: Packed | Callable[[], Packed],
         pressing: Index | None = None,
         note: str = "",
     ) -> None:
-        """Store the result; `pressing` is (n + rows,) as in `own_hierarchy.run`."""
+        """Store the result; `pressing` is (n + rows,) as in `own_hierarchy.run`; `problem` may be built when needed."""
         self.qd = qd
         self.status = status
         self.iterations = iterations
         self.solver = solver
         self.solve_time = solve_time
         self.note = note
-        self._problem = problem
+        self._given = problem
         self._pressing = pressing
+
+    @cached_property
+    def _problem(self) -> Packed:
+        return self._given() if callable(self._given) else self._given
 
     @property
     def ok(self) -> bool:

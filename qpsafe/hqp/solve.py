@@ -25,7 +25,7 @@ from qpsafe.hqp.solution import (
 
 Array = NDArray[np.float64]
 
-_STATUS = (SOLVED, ROWS_INFEASIBLE, STOPPED, INVALID_DATA, INVALID_LIMITS, INEXACT, FAILED)  # codes of own_hierarchy
+STATUS = (SOLVED, ROWS_INFEASIBLE, STOPPED, INVALID_DATA, INVALID_LIMITS, INEXACT, FAILED)  # codes of own_hierarchy
 _solve_packed: Callable[..., tuple[Array, NDArray[np.int64]]] | None = None
 
 
@@ -82,10 +82,15 @@ def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") ->
         _solve_packed, begin = solve_packed, perf_counter()
     qd, info = _solve_packed(*problem, damping)
     code, turns, where = info[:3].tolist()
-    status = _STATUS[code]
+    status = STATUS[code]
     if code > 1 and not note:
-        note = f"row {where}" if status == INEXACT else _name(problem, where)
+        note = note_of(status, where, problem)
     return Solution(qd, status, turns, "own", perf_counter() - begin, problem, info[3:], note)
+
+
+def note_of(status: str, where: int, problem: Packed) -> str:
+    """Where a status other than the good ones comes from."""
+    return f"row {where}" if status == INEXACT else _name(problem, where)
 
 
 def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from functools import partial
+from time import perf_counter
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,10 +15,14 @@ from numpy.typing import NDArray
 from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
 from qpsafe.hqp.level import Level
+from qpsafe.hqp.packing import Packed
 from qpsafe.hqp.solution import Solution
-from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.hqp.solve import STATUS, note_of, solve_hierarchy
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult
+
+Array = NDArray[np.float64]
+_FLOAT = np.dtype(np.float64)
 
 Projection = Literal["strict", "paper"]
 
@@ -55,11 +61,47 @@ class HierarchicalLaw:
         self.projection = projection
         self.solver = solver
         if solver in (None, "own"):
-            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
+            from qpsafe.hqp.own_regimes import solve_regimes  # compiles now if need be, not within the first tick
+
+            self._solve_regimes = solve_regimes
         self.damping = float(damping)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
+        result = self._solve_together(problem) if self.solver in (None, "own") else None
+        return result or self._solve_one_by_one(problem)
+
+    def _solve_together(self, problem: LawProblem) -> LawResult | None:
+        """All regimes in one compiled call, to the same bits; None where that is not possible."""
+        tasks, qd0, activations, lower, upper, soft = problem
+        n, weights = len(qd0), regime_weights(activations)
+        if soft or lower is None or upper is None or not tasks or (self.projection == "paper" and weights[2:].any()):
+            return None
+        begin = perf_counter()
+        matrices, targets = zip(*tasks, strict=True)
+        A, b = np.concatenate(matrices), np.concatenate(targets)
+        counts = tuple(map(len, targets))
+        known = A.dtype is b.dtype is qd0.dtype is lower.dtype is upper.dtype is _FLOAT
+        if not known or A.shape[1:] != (n,) or b.ndim != 1 or counts != tuple(map(len, matrices)):
+            return None  # plain NumPy says what is wrong
+        if not (lower.shape == upper.shape == qd0.shape and len(weights) == len(tasks) + 1):
+            return None
+        qd, x, info = self._solve_regimes(A, b, counts, weights, qd0, lower, upper, self.damping)
+        regimes, status = [], "solved"
+        heads, share = info[:, :3].tolist(), (perf_counter() - begin) / np.count_nonzero(weights)
+        for kept, weight in enumerate(weights.tolist()):
+            if weight > 0.0:
+                code, turns, where = heads[kept]
+                packed = partial(_packed, problem, A, b, counts[:kept])
+                note = note_of(STATUS[code], where, packed()) if code > 1 else ""
+                solution = Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)
+                regimes.append((weight, solution))
+                if code and status == "solved":
+                    status = solution.status
+        return LawResult(qd, status, tuple(regimes))
+
+    def _solve_one_by_one(self, problem: LawProblem) -> LawResult:
+        """Regime by regime, by any solver."""
         qd = np.zeros(len(problem.qd0))
         status = "solved"
         regimes = []
@@ -84,6 +126,16 @@ class HierarchicalLaw:
             target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
             levels = [*problem.soft, (J_1, xd_1), (identity, target)]
         return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=self.damping)
+
+
+def _packed(problem: LawProblem, A: Array, b: Array, counts: tuple[int, ...]) -> Packed:
+    """The hierarchy of a regime as its solution wants it to explain itself."""
+    rows, n = sum(counts), len(problem.qd0)
+    low = np.concatenate((b[:rows], problem.qd0))
+    assert problem.lower is not None
+    assert problem.upper is not None
+    matrix = np.concatenate((A[:rows], _identity(n)))
+    return Packed(matrix, low, low, None, [*counts, n], problem.lower, problem.upper, False)
 
 
 @functools.lru_cache(maxsize=32)

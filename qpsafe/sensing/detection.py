@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.compiled import Array, Vector, add, dot, entry, inline, readable, row
 from qpsafe.sensing.health import CLEAR
 
 if TYPE_CHECKING:
@@ -39,19 +42,21 @@ class Detection(NamedTuple):
     capped: bool = False
 
 
+_FLOAT = np.dtype(np.float64)
+
 #: How far outside its limits a measured joint may be [rad], and how many times its largest speed it may have. Beyond
 #: it is no measurement but, say, degrees taken for radians.
 PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
 
 
 def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    """Measured q (n,) [rad], finite and not absurd, as an array of its own; or BadInput."""
+    """Measured q (n,) [rad], finite and not absurd, the caller's own array if it may be; or BadInput."""
     lowest, highest, _, _ = _plausible(robot)
     return _as_joint_vector("q", value, lowest, highest, robot.joint_names)
 
 
 def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    """Measured q̇ (n,) [rad/s], finite and not absurd, as an array of its own; or BadInput."""
+    """Measured q̇ (n,) [rad/s], finite and not absurd, the caller's own array if it may be; or BadInput."""
     _, _, lowest, highest = _plausible(robot)
     return _as_joint_vector("qd", value, lowest, highest, robot.joint_names)
 
@@ -69,14 +74,21 @@ def _as_joint_vector(
     array = _as_floats(name, value)
     if array.shape != lowest.shape:
         raise BadInput(f"{name} has shape {array.shape}, expected {lowest.shape}")
-    sane = (lowest <= array) & (array <= highest)  # false for NaN
-    if not sane.all():
+    if not _all_between(lowest, array, highest):
+        sane = (lowest <= array) & (array <= highest)
         if not np.isfinite(array).all():
             raise BadInput(f"{name} is not finite: {array}")
-        wild = ~sane
-        values = [f"{joints[i]} = {array[i]:g}" for i in np.flatnonzero(wild)]
+        values = [f"{joints[i]} = {array[i]:g}" for i in np.flatnonzero(~sane)]
         raise BadInput(f"{name} is too far outside the limits to be a measurement: " + ", ".join(values))
     return array
+
+
+@entry(types.boolean(readable(1), readable(1), readable(1)))
+def _all_between(lowest: Array, array: Array, highest: Array) -> bool:
+    good = True
+    for i in range(array.shape[0]):
+        good = good and lowest[i] <= array[i] <= highest[i]  # false for NaN
+    return good
 
 
 def as_detection(
@@ -141,10 +153,12 @@ def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
         points = points.reshape(0, 3)
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInput(f"points have shape {points.shape}, expected (p, 3)")
-    if not np.isfinite(points).all():
+    points = points.copy()  # they go into the tick
+    links = np.empty(len(points), dtype=np.int64)
+    if not _nearest(points, wire.starts, wire.ends, links):
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         raise BadInput("points are not finite: number " + ", ".join(str(i) for i in bad))
-    return Detection(points, nearest_link(points, wire))
+    return Detection(points, links)
 
 
 def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
@@ -152,18 +166,39 @@ def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
 
     Links share their ends, so that is no rare case: rounding must not decide it.
     """
-    along = wire.ends - wire.starts  # (links, 3)
-    length2 = np.maximum(np.sum(along**2, axis=1), 1e-300)
-    offset = points[:, None, :] - wire.starts  # (p, links, 3)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a point too far away for its square
-        t = np.clip(np.sum(offset * along, axis=2) / length2, 0.0, 1.0)
-        distance2 = np.sum((offset - t[..., None] * along) ** 2, axis=2)
-        nearest = distance2 <= (1.0 + 1e-9) * np.min(distance2, axis=1, keepdims=True) + 1e-18
-    return np.argmax(nearest, axis=1)
+    links = np.empty(len(points), dtype=np.int64)
+    _nearest(points, wire.starts, wire.ends, links)
+    return links
+
+
+@inline
+def _distance2(p: Vector, r0: Vector, r1: Vector) -> float:
+    """Square of the distance of p to a segment; infinite where p is too far away for it."""
+    d, w = add(r1, -1.0, r0), add(p, -1.0, r0)
+    n = add(w, -min(max(dot(w, d) / max(dot(d, d), 1e-300), 0.0), 1.0), d)
+    return dot(n, n)
+
+
+@entry(types.boolean(readable(2), readable(2), readable(2), types.int64[::1]))
+def _nearest(points: Array, r0: Array, r1: Array, links: Array) -> bool:
+    """Fill the links; returns whether all points are finite."""
+    good = True
+    for i in range(points.shape[0]):
+        p = row(points, i)
+        good = good and isfinite(p[0]) and isfinite(p[1]) and isfinite(p[2])
+        smallest, links[i] = np.inf, 0
+        for j in range(r0.shape[0]):
+            smallest = min(smallest, _distance2(p, row(r0, j), row(r1, j)))
+        for j in range(r0.shape[0] - 1, -1, -1):
+            if _distance2(p, row(r0, j), row(r1, j)) <= (1.0 + 1e-9) * smallest + 1e-18:
+                links[i] = j
+    return good
 
 
 def _as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """`value` as a float64 array of its own; real numbers only: no text, no bool, nothing complex, None or masked."""
+    """`value` as a float64 array; real numbers only: no text, no bool, nothing complex, None or masked."""
+    if type(value) is np.ndarray and value.dtype is _FLOAT:  # the usual case
+        return value
     try:
         array = np.asarray(value)
     except Exception as error:  # whatever a stranger's __array__ raises

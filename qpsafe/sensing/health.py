@@ -8,10 +8,9 @@ Non-finite values are found before any arithmetic is done with them; every compa
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.danger.compiled import Array, Vector, inline
 from qpsafe.sensing.rules import SensingRules
 
 HEALTHY, NOT_A_NUMBER, BELOW_ZERO, STALE, STUCK = range(5)
@@ -39,65 +38,41 @@ class SpotHealth:
     """
 
     def __init__(self, count: int, rules: SensingRules, dt: float) -> None:
-        self._stuck_ticks = max(rules.ticks(rules.stuck_after, dt), 3)
-        self._dead_ticks = max(rules.ticks(rules.dead_after, dt), 1)
-        self._max_age, self._motion = rules.max_age, rules.stuck_motion
+        self.stuck_ticks = max(rules.ticks(rules.stuck_after, dt), 3)
+        self.dead_ticks = max(rules.ticks(rules.dead_after, dt), 1)
         self.most = int(np.floor(rules.dead_share * count + 1e-9))
-        self._count = count
+        #: Columns: code of this tick, ticks without a usable reading up to now, ticks with the same reading.
+        self.counts: NDArray[np.int64] = np.zeros((count, 3), dtype=np.int64)
+        self.dead: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
+        #: Columns: the last reading, NaN for none, and the point it meant at first.
+        self.seen = np.empty((count, 4))
+        self.codes, self._sick = self.counts[:, 0], self.counts[:, 1]
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, what was acknowledged or not."""
-        k = self._count
-        self.codes: NDArray[np.int64] = np.zeros(k, dtype=np.int64)
-        self.dead: NDArray[np.bool_] = np.zeros(k, dtype=np.bool_)
+        self.counts[:] = 0
+        self.dead[:] = False
+        self.seen[:, 0], self.seen[:, 1:] = np.nan, 0.0
         self.stopped = False
-        self._tally = np.zeros(2, dtype=np.int64)  # spots that are dead; that are unusable or dead, in this tick
-        self._out = 0  # spots that are unusable or dead in this tick
-        self._sick = np.zeros(k, dtype=np.int64)  # ticks without a usable reading, up to now
-        self._same = np.zeros(k, dtype=np.int64)  # ticks with the same reading, up to now
-        self._last = np.full(k, np.nan)
-        self._anchor = np.zeros((k, 3))  # the point it meant at first
+        self._dying = self._out = 0  # spots that are dead; that are unusable or dead in this tick
 
     def acknowledge(self) -> None:
         """Let spots that work again work, and the robot move if enough of them do."""
-        self.dead = self._sick >= self._dead_ticks
-        self.stopped = int(self.dead.sum()) > self.most
+        self.dead[:] = self._sick >= self.dead_ticks
+        self._dying = int(self.dead.sum())
+        self.stopped = self._dying > self.most
         self._out = int((self.dead | (self.codes != HEALTHY)).sum())
 
-    def update(self, distances: Array, ages: Array, origins: Array, directions: Array) -> None:
-        """Take one tick's readings.
-
-        Args:
-            distances: Readings (k,) [m].
-            ages: How old they are (k,) [s].
-            origins: Of the spots now (k, 3) [m].
-            directions: Of the spots now (k, 3).
-        """
-        _classify(
-            distances,
-            ages,
-            origins,
-            directions,
-            self._max_age,
-            self._stuck_ticks,
-            self._motion,
-            self._dead_ticks,
-            self._last,
-            self._same,
-            self._anchor,
-            self.codes,
-            self._sick,
-            self.dead,
-            self._tally,
-        )
-        self._out = int(self._tally[1])
-        self.stopped |= bool(self._tally[0] > self.most)
+    def take(self, dead: int, out: int) -> None:
+        """Take how many spots are dead, and how many dead or unusable, in this tick; `judge` has seen every spot."""
+        self._dying, self._out = dead, out
+        self.stopped |= dead > self.most
 
     @property
     def severity(self) -> str:
         """`clear`, `capped` or `stopped`."""
-        return STOPPED if self.stopped else CAPPED if self.dead.any() else CLEAR
+        return STOPPED if self.stopped else CAPPED if self._dying else CLEAR
 
     @property
     def too_many(self) -> bool:
@@ -110,74 +85,46 @@ class SpotHealth:
         return (self.dead | (self.codes != HEALTHY)).nonzero()[0] if self._out else np.empty(0, dtype=np.intp)
 
 
-_INTS = types.int64[::1]
-
-
-@entry(
-    types.void(
-        readable(1),
-        readable(1),
-        readable(2),
-        readable(2),
-        types.float64,
-        types.int64,
-        types.float64,
-        types.int64,
-        types.float64[::1],
-        _INTS,
-        types.float64[:, ::1],
-        _INTS,
-        _INTS,
-        types.boolean[::1],
-        _INTS,
-    )
-)
-def _classify(
-    distances: Array,
-    ages: Array,
-    origins: Array,
-    directions: Array,
+@inline
+def judge(
+    i: int,
+    d: float,
+    age: float,
+    origin: Vector,
+    direction: Vector,
     max_age: float,
-    stuck_ticks: int,
     motion: float,
+    stuck_ticks: int,
     dead_ticks: int,
-    last: Array,
-    same: Array,
-    anchor: Array,
-    codes: Array,
-    sick: Array,
+    counts: Array,
+    seen: Array,
     dead: Array,
-    tally: Array,
-) -> None:
-    """Fill codes, count sick ticks, let the dead die; tally how many are dead, and how many dead or unusable."""
-    count = out = 0
-    for i in range(distances.shape[0]):
-        d = distances[i]
-        if d != d:
-            codes[i] = NOT_A_NUMBER
-        elif not d >= 0.0:  # -inf too
-            codes[i] = BELOW_ZERO
-        elif not ages[i] <= max_age:  # an age that is not a number is stale
-            codes[i] = STALE
-        else:
-            codes[i] = HEALTHY
-        # stuck: the same bits tick after tick, while the point they mean is carried along by the robot
-        if 0.0 <= d < np.inf:
-            moved = 0.0
-            for j in range(3):
-                point = origins[i, j] + d * directions[i, j]
-                if d != last[i]:
-                    anchor[i, j] = point
-                moved += (point - anchor[i, j]) ** 2
-            same[i] = same[i] + 1 if d == last[i] else 1
-            last[i] = d
-            if same[i] >= stuck_ticks and moved >= motion * motion and codes[i] == HEALTHY:
-                codes[i] = STUCK
-        else:
-            same[i], last[i] = 0, np.nan
-        sick[i] = 0 if codes[i] == HEALTHY else sick[i] + 1
-        if sick[i] >= dead_ticks:
-            dead[i] = True
-        count += dead[i]
-        out += dead[i] or sick[i] > 0
-    tally[0], tally[1] = count, out
+) -> int:
+    """Code of spot i's reading d; counts sick ticks, lets the dead die. Arrays as in `SpotHealth`."""  # fmt: skip
+    if d != d:
+        code = NOT_A_NUMBER
+    elif not d >= 0.0:  # -inf too
+        code = BELOW_ZERO
+    elif not age <= max_age:  # an age that is not a number is stale
+        code = STALE
+    else:
+        code = HEALTHY
+    # stuck: the same bits tick after tick, while the point they mean is carried along by the robot
+    if 0.0 <= d < np.inf:
+        last, moved = seen[i, 0], 0.0
+        for j in range(3):
+            point = origin[j] + d * direction[j]
+            if d != last:
+                seen[i, 1 + j] = point
+            moved += (point - seen[i, 1 + j]) ** 2
+        counts[i, 2] = counts[i, 2] + 1 if d == last else 1
+        seen[i, 0] = d
+        if counts[i, 2] >= stuck_ticks and moved >= motion * motion and code == HEALTHY:
+            code = STUCK
+    else:
+        counts[i, 2], seen[i, 0] = 0, np.nan
+    counts[i, 0] = code
+    counts[i, 1] = 0 if code == HEALTHY else counts[i, 1] + 1
+    if counts[i, 1] >= dead_ticks:
+        dead[i] = True
+    return code

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, Vector, add, dot, entry, inline, readable, row
-from qpsafe.robot.wire import Wire
+from qpsafe.danger.compiled import Array, Vector, add, dot, inline, row
 from qpsafe.sensing.rules import SensingRules
 
 
@@ -24,52 +21,21 @@ class PointHold:
         count: Number of spots.
         rules: Hold time, speed, jump, d_min.
         dt: Tick [s].
-        range_max: Of each spot (k,) [m].
     """
 
-    def __init__(self, count: int, rules: SensingRules, dt: float, range_max: Array) -> None:
-        self._limit = rules.ticks(rules.hold_time, dt)
-        self._step, self._jump, self._nearest = rules.approach_speed * dt, rules.jump, rules.d_min
-        self._range_max = range_max
-        self._count = count
+    def __init__(self, count: int, rules: SensingRules, dt: float) -> None:
+        self.ticks = rules.ticks(rules.hold_time, dt)
+        self.step = rules.approach_speed * dt
+        #: Columns: distance at which each spot saw its point last, +inf for none, and the point.
+        self.held = np.empty((count, 4))
+        self.seen = self.held[:, 0]
+        self.age = np.empty(count, dtype=np.int64)  # ticks since then
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        k = self._count
-        self.points = np.zeros((k, 3))
-        self.seen = np.full(k, np.inf)  # distance at which the spot saw its point last, +inf for none
-        self.age = np.zeros(k, dtype=np.int64)  # ticks since then
-
-    def update(
-        self, distances: Array, counts: NDArray[np.bool_], points: Array, origins: Array, wire: Wire
-    ) -> NDArray[np.bool_]:
-        """Take one tick's readings; which spots have a point that counts in `self.points` (k,).
-
-        Args:
-            distances: Readings (k,) [m]; +inf where nothing is in sight, NaN where it is not known.
-            counts: Whether what is read counts, or is a known obstacle, (k,).
-            points: What is read, (k, 3) [m].
-            origins: Of the spots now, (k, 3) [m].
-            wire: The robot's wire now.
-        """
-        _hold(
-            distances,
-            counts,
-            points,
-            origins,
-            wire.starts,
-            wire.ends,
-            self._range_max,
-            self._limit,
-            self._step,
-            self._jump,
-            self._nearest,
-            self.seen,
-            self.age,
-            self.points,
-        )
-        return self.seen < np.inf
+        self.held[:], self.age[:] = 0.0, 0
+        self.seen[:] = np.inf
 
 
 @inline
@@ -84,58 +50,55 @@ def _distance_to_wire(p: Vector, r0: Array, r1: Array) -> float:
     return np.sqrt(smallest)
 
 
-@entry(
-    types.void(
-        readable(1),
-        types.Array(types.boolean, 1, "A", readonly=True),
-        readable(2),
-        readable(2),
-        readable(2),
-        readable(2),
-        readable(1),
-        types.int64,
-        types.float64,
-        types.float64,
-        types.float64,
-        types.float64[::1],
-        types.int64[::1],
-        types.float64[:, ::1],
-    )
-)
-def _hold(
-    distances: Array,
-    counts: Array,
-    points: Array,
-    origins: Array,
+@inline
+def believe(
+    i: int,
+    d: float,
+    counts: bool,
+    p: Vector,
+    origin: Vector,
     r0: Array,
     r1: Array,
-    range_max: Array,
+    range_max: float,
     limit: int,
     step: float,
     jump: float,
     nearest: float,
-    seen: Array,
-    age: Array,
     held: Array,
-) -> None:
-    for i in range(distances.shape[0]):
-        d = distances[i]
-        known = d == d
-        # NaN fails: a sick reading is never believed, only waited for
-        if known and (d <= seen[i] + jump or age[i] >= limit):
-            age[i] = 0
-            seen[i] = d if counts[i] else np.inf
-            held[i, 0], held[i, 1], held[i, 2] = row(points, i)
-            continue
-        if age[i] >= limit:  # sick for too long: forgotten, but never called free (the spot is dead by now)
-            seen[i] = np.inf
-        age[i] += 1
-        if seen[i] == np.inf or (known and d > range_max[i] and seen[i] + jump > range_max[i]):
-            continue  # nothing is held, or it may just have left through the end of the range: held where it was
-        p = row(held, i)
-        way = add(row(origins, i), -1.0, p)
-        length = np.sqrt(dot(way, way))
-        if length > step:
-            p = add(p, step / length, way)
-            if _distance_to_wire(p, r0, r1) >= nearest:
-                held[i, 0], held[i, 1], held[i, 2] = p
+    age: Array,
+) -> bool:
+    """Take spot i's reading; whether a point of it counts now, in `held`.
+
+    Args:
+        i: Number of the spot.
+        d: Reading [m]; +inf where nothing is in sight, NaN where it is not known.
+        counts: Whether what is read counts, or is a known obstacle.
+        p: What is read.
+        origin: Of the spot now.
+        r0, r1: Starts and ends of the robot's wire now.
+        range_max: Of the spot.
+        limit, step, jump, nearest: Of the rules: hold time in ticks, way in a tick, jump, d_min.
+        held, age: As in `PointHold`.
+    """  # fmt: skip
+    known = d == d
+    # NaN fails: a sick reading is never believed, only waited for
+    if known and (d <= held[i, 0] + jump or age[i] >= limit):
+        age[i] = 0
+        held[i, 0] = d if counts else np.inf
+        held[i, 1], held[i, 2], held[i, 3] = p
+        return counts
+    if age[i] >= limit:  # sick for too long: forgotten, but never called free (the spot is dead by now)
+        held[i, 0] = np.inf
+    age[i] += 1
+    if held[i, 0] == np.inf:
+        return False
+    if known and d > range_max and held[i, 0] + jump > range_max:
+        return True  # it may just have left through the end of the range: held where it was
+    q = held[i, 1], held[i, 2], held[i, 3]
+    way = add(origin, -1.0, q)
+    length = np.sqrt(dot(way, way))
+    if length > step:
+        q = add(q, step / length, way)
+        if _distance_to_wire(q, r0, r1) >= nearest:
+            held[i, 1], held[i, 2], held[i, 3] = q
+    return True

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.danger.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
 
 
@@ -133,6 +133,8 @@ class HullSet:
         self.first = np.concatenate(([0], np.cumsum([len(p) for p in planes]))).astype(np.int64)
         self.centres = np.array(centres).reshape(-1, 3)
         self.radii = np.array(radii, dtype=float)
+        #: For compiled code: bodies, first planes, planes, balls around the hulls (centre, radius) (h, 4).
+        self.tables = (self.bodies, self.first, self.planes, np.column_stack((self.centres, self.radii)))
 
     def take(self, chosen: Sequence[int]) -> HullSet:
         """Some of the hulls."""
@@ -167,18 +169,40 @@ class HullSet:
             poses: Of the bodies in the world, (b, 4, 4).
         """
         found = np.empty(len(points), dtype=np.int64)
-        _find(points, tolerance, poses, self.bodies, self.first, self.planes, self.centres, self.radii, found)
+        _find(points, tolerance, poses, *self.tables, found)
         return found
+
+
+@inline
+def within(p: Vector, t: float, poses: Array, bodies: Array, first: Array, planes: Array, balls: Array) -> int:
+    """The first hull that the point p lies in, or no farther than t from all of its faces; -1 for none."""
+    for h in range(bodies.shape[0]):
+        T, cx, cy, cz = poses[bodies[h]], balls[h, 0], balls[h, 1], balls[h, 2]
+        dx = p[0] - (T[0, 0] * cx + T[0, 1] * cy + T[0, 2] * cz + T[0, 3])
+        dy = p[1] - (T[1, 0] * cx + T[1, 1] * cy + T[1, 2] * cz + T[1, 3])
+        dz = p[2] - (T[2, 0] * cx + T[2, 1] * cy + T[2, 2] * cz + T[2, 3])
+        # a face moved out by t moves no point of the hull's box out by more than 2 t
+        reach = balls[h, 3] + 2.0 * max(t, 0.0)
+        if not dx * dx + dy * dy + dz * dz <= reach * reach:
+            continue
+        # the point in the body's frame
+        x = T[0, 0] * dx + T[1, 0] * dy + T[2, 0] * dz + cx
+        y = T[0, 1] * dx + T[1, 1] * dy + T[2, 1] * dz + cy
+        z = T[0, 2] * dx + T[1, 2] * dy + T[2, 2] * dz + cz
+        inside = True
+        for k in range(first[h], first[h + 1]):
+            if not planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3] <= t:
+                inside = False
+                break
+        if inside:
+            return h
+    return -1
 
 
 _INTS = types.Array(types.int64, 1, "A", readonly=True)
 
 
-@entry(
-    types.void(
-        readable(2), readable(1), readable(3), _INTS, _INTS, readable(2), readable(2), readable(1), types.int64[::1]
-    )
-)
+@entry(types.void(readable(2), readable(1), readable(3), _INTS, _INTS, readable(2), readable(2), types.int64[::1]))
 def _find(
     points: Array,
     tolerance: Array,
@@ -186,30 +210,8 @@ def _find(
     bodies: Array,
     first: Array,
     planes: Array,
-    centres: Array,
-    radii: Array,
+    balls: Array,
     found: Array,
 ) -> None:
-    found[:] = -1
-    for h in range(bodies.shape[0]):
-        T, c = poses[bodies[h]], centres[h]
-        cx = T[0, 0] * c[0] + T[0, 1] * c[1] + T[0, 2] * c[2] + T[0, 3]
-        cy = T[1, 0] * c[0] + T[1, 1] * c[1] + T[1, 2] * c[2] + T[1, 3]
-        cz = T[2, 0] * c[0] + T[2, 1] * c[1] + T[2, 2] * c[2] + T[2, 3]
-        for i in range(points.shape[0]):
-            dx, dy, dz = points[i, 0] - cx, points[i, 1] - cy, points[i, 2] - cz
-            # a face moved out by t moves no point of the hull's box out by more than 2 t
-            reach = radii[h] + 2.0 * max(tolerance[i], 0.0)
-            if found[i] >= 0 or not dx * dx + dy * dy + dz * dz <= reach * reach:
-                continue
-            # the point in the body's frame
-            x = T[0, 0] * dx + T[1, 0] * dy + T[2, 0] * dz + c[0]
-            y = T[0, 1] * dx + T[1, 1] * dy + T[2, 1] * dz + c[1]
-            z = T[0, 2] * dx + T[1, 2] * dy + T[2, 2] * dz + c[2]
-            inside = True
-            for k in range(first[h], first[h + 1]):
-                if not planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3] <= tolerance[i]:
-                    inside = False
-                    break
-            if inside:
-                found[i] = h
+    for i in range(points.shape[0]):
+        found[i] = within(row(points, i), tolerance[i], poses, bodies, first, planes, balls)

@@ -13,8 +13,9 @@ from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import HullSet, Obstacle
+from qpsafe.sensing.kernel import take_readings
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spots import SpotArray, detected_points, rays_in_world
+from qpsafe.sensing.spots import SpotArray
 from qpsafe.sensing.velocity import ApproachVelocity
 
 if TYPE_CHECKING:
@@ -76,23 +77,39 @@ class DistanceSensing:
                 raise ConfigurationError("SafetyController", f"known[{i}]", obstacle, "an Obstacle, e.g. Obstacle.box")
         spots.check(robot)
         self.spots = spots
-        self._bodies, self._rays = spots.mounting(robot)
         # body 0 is the world: known obstacles stand in it
-        self._known = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
+        hulls = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
         if rules.self_detection:
-            self._known = self._known + body_hull_set(robot)
-        self._cone = np.tan(0.5 * spots.field_of_view)
-        self._fresh_age = np.zeros(len(spots))
-        self.health = SpotHealth(len(spots), rules, dt)
-        self._hold = PointHold(len(spots), rules, dt, spots.range_max)
-        self._velocity = ApproachVelocity(len(spots), dt) if rules.velocities else None
+            hulls = hulls + body_hull_set(robot)
+        count = len(spots)
+        self.health = SpotHealth(count, rules, dt)
+        self._hold = PointHold(count, rules, dt)
+        self._velocity = ApproachVelocity(count, dt)
+        bodies, rays = spots.mounting(robot)
+        links = np.asarray(spots.links, dtype=np.int64)
+        cone = np.tan(0.5 * spots.field_of_view)
+        ranges = np.ascontiguousarray(np.column_stack((spots.range_max, cone)))
+        self._fresh = np.zeros(count)
+        self._tables = (bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
+        self._memory = (
+            self.health.counts, self.health.seen, self.health.dead,
+            self._hold.held, self._hold.age, self._velocity.track,
+        )  # fmt: skip
+
+    def _settings(self, dt: float) -> tuple[Array, NDArray[np.int64]]:
+        """Numbers and ticks as `take_readings` wants them."""
+        rules, health, hold, filter_ = self.rules, self.health, self._hold, self._velocity
+        numbers = (
+            dt, rules.d_min, rules.tolerance, rules.max_age, rules.stuck_motion,
+            hold.step, rules.jump, filter_.alpha, filter_.beta, filter_.fastest,
+        )  # fmt: skip
+        return np.array(numbers), np.array((health.stuck_ticks, health.dead_ticks, hold.ticks, rules.velocities))
 
     def reset(self) -> None:
         """Forget everything: held points, sick and dead spots."""
         self.health.reset()
         self._hold.reset()
-        if self._velocity is not None:
-            self._velocity.reset()
+        self._velocity.reset()
 
     def acknowledge(self) -> None:
         """A person has looked: spots that work again count as working, severity may fall."""
@@ -107,34 +124,22 @@ class DistanceSensing:
             distances: One reading a spot (k,) [m], any numbers: +inf where nothing is in sight (REP 117).
             ages: How old each reading is (k,) [s]; None for fresh ones.
         """
-        poses = state.body_poses()
-        origins, directions = rays_in_world(poses, self._bodies, self._rays)
+        k = len(self._fresh)
+        points, links, velocities = np.empty((k, 3)), np.empty(k, dtype=np.int64), np.empty((k, 3))
+        count, dead, out = take_readings(
+            distances, self._fresh if ages is None else ages, state.memory, wire.starts, wire.ends,
+            *self._tables, *self._memory, points, links, velocities,
+        )  # fmt: skip
         health = self.health
-        health.update(distances, self._fresh_age if ages is None else ages, origins, directions)
-
-        # (7), for what is usable and within range; elsewhere the point is the spot itself and never counts
-        usable = health.codes == HEALTHY
-        hit = usable & (distances <= self.spots.range_max)
-        reach = np.where(hit, distances, 0.0)
-        points = detected_points(origins, directions, reach)
-        # known obstacles and the robot itself do not count, but for what is nearer than d_min
-        tolerance = self.rules.tolerance + self._cone * reach
-        unknown = self._known.find(points, tolerance, poses) < 0
-        counts = hit & (unknown | (reach < self.rules.d_min))
-
-        reading = np.where(usable, np.where(hit, reach, np.inf), np.nan)
-        present = self._hold.update(reading, counts, points, origins, wire)
-        velocities = None
-        if self._velocity is not None:
-            fresh = present & (self._hold.age == 0)
-            velocities = self._velocity.update(reading, fresh, origins, directions)[present]
-        points, links = self._hold.points[present], self.spots.links[present]
-        return Seen(points, links, velocities, health.severity, health.too_many, self._notes())
+        health.take(dead, out)
+        moving = velocities[:count] if self.rules.velocities else None
+        notes = self._notes() if out or health.stopped else ()
+        return Seen(points[:count], links[:count], moving, health.severity, health.too_many, notes)
 
     @property
     def unseen(self) -> tuple[str, ...]:
         """Names of the spots whose sector nobody sees: unusable in the last tick, or dead."""
-        return tuple(self.spots.names[i] for i in self.health.out_of_order)
+        return tuple([self.spots.names[i] for i in self.health.out_of_order])
 
     @property
     def counted(self) -> Array:

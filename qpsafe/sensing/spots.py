@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import entry, readable
+from qpsafe.danger.compiled import Vector, entry, inline, readable
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -191,6 +191,24 @@ def rays_in_world(poses: Array, bodies: NDArray[np.int64], rays: Array) -> tuple
     return origins, directions
 
 
+@inline
+def ray_of(T: Array, ray: Array) -> tuple[Vector, Vector]:
+    """Origin and direction in the world of a ray, homogeneous columns (4, 2), that is fixed in a body at T (4, 4)."""
+    x, y, z = ray[0, 0], ray[1, 0], ray[2, 0]
+    a, b, c = ray[0, 1], ray[1, 1], ray[2, 1]
+    origin = (
+        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3],
+        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3],
+        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3],
+    )
+    direction = (
+        T[0, 0] * a + T[0, 1] * b + T[0, 2] * c,
+        T[1, 0] * a + T[1, 1] * b + T[1, 2] * c,
+        T[2, 0] * a + T[2, 1] * b + T[2, 2] * c,
+    )
+    return origin, direction
+
+
 @entry(
     types.void(
         readable(3),
@@ -202,10 +220,9 @@ def rays_in_world(poses: Array, bodies: NDArray[np.int64], rays: Array) -> tuple
 )
 def _rays(poses: Array, bodies: Array, rays: Array, origins: Array, directions: Array) -> None:
     for i in range(bodies.shape[0]):
-        T, a = poses[bodies[i]], rays[i]
-        for j in range(3):
-            origins[i, j] = T[j, 0] * a[0, 0] + T[j, 1] * a[1, 0] + T[j, 2] * a[2, 0] + T[j, 3]
-            directions[i, j] = T[j, 0] * a[0, 1] + T[j, 1] * a[1, 1] + T[j, 2] * a[2, 1]
+        origin, direction = ray_of(poses[bodies[i]], rays[i])
+        origins[i, 0], origins[i, 1], origins[i, 2] = origin
+        directions[i, 0], directions[i, 1], directions[i, 2] = direction
 
 
 def detected_points(origins: Array, directions: Array, distances: Array) -> Array:

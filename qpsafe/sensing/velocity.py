@@ -8,10 +8,8 @@ that goes away is no reason to count less danger.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.danger.compiled import Array, Vector, inline
 
 
 class ApproachVelocity:
@@ -28,96 +26,54 @@ class ApproachVelocity:
     """
 
     def __init__(self, count: int, dt: float, time_constant: float = 0.04, fastest: float = 2.0) -> None:
-        self._dt, self._fastest = dt, fastest
-        self._alpha = min(dt / time_constant, 1.0)
-        self._beta = self._alpha**2 / (2.0 - self._alpha)
-        self._count = count
+        self.alpha = min(dt / time_constant, 1.0)
+        self.beta = self.alpha**2 / (2.0 - self.alpha)
+        self.fastest = fastest
+        #: Columns: last reading, NaN for none; z - x; v, negative where it comes nearer; the spot's place.
+        self.track = np.empty((count, 6))
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        k = self._count
-        self._distance = np.full(k, np.nan)  # last reading, NaN for none
-        self._origin = np.zeros((k, 3))
-        self._error = np.zeros(k)  # z - x
-        self.speed = np.zeros(k)  # along the ray, negative where it comes nearer
-
-    def update(self, distances: Array, fresh: NDArray[np.bool_], origins: Array, directions: Array) -> Array:
-        """Velocity (k, 3) of every point after this tick [m/s]; zero where nothing approaches.
-
-        Args:
-            distances: Readings (k,) [m].
-            fresh: Where they are readings of the same obstacle as before or of a new one; the others start anew (k,).
-            origins: Of the spots (k, 3) [m].
-            directions: Of the spots (k, 3).
-        """
-        velocities = np.empty((self._count, 3))
-        _track(
-            distances,
-            fresh,
-            origins,
-            directions,
-            self._dt,
-            self._alpha,
-            self._beta,
-            self._fastest,
-            self._distance,
-            self._origin,
-            self._error,
-            self.speed,
-            velocities,
-        )
-        return velocities
+        self.track[:] = 0.0
+        self.track[:, 0] = np.nan
 
 
 #: A reading that changes faster than this starts the filter anew [m/s].
 _JUMP = 12.5
 
 
-@entry(
-    types.void(
-        readable(1),
-        types.Array(types.boolean, 1, "A", readonly=True),
-        readable(2),
-        readable(2),
-        types.float64,
-        types.float64,
-        types.float64,
-        types.float64,
-        types.float64[::1],
-        types.float64[:, ::1],
-        types.float64[::1],
-        types.float64[::1],
-        types.float64[:, ::1],
-    )
-)
-def _track(
-    distances: Array,
-    fresh: Array,
-    origins: Array,
-    directions: Array,
+@inline
+def approach(
+    i: int,
+    d: float,
+    fresh: bool,
+    origin: Vector,
+    direction: Vector,
     dt: float,
     alpha: float,
     beta: float,
     fastest: float,
-    last: Array,
-    origin: Array,
-    error: Array,
-    speed: Array,
-    velocities: Array,
-) -> None:
-    for i in range(distances.shape[0]):
-        change = distances[i] - last[i]
-        for j in range(3):
-            change += directions[i, j] * (origins[i, j] - origin[i, j])
-        if fresh[i] and abs(change) < _JUMP * dt:  # NaN fails: no reading before
-            r = error[i] + change - speed[i] * dt
-            error[i] = (1.0 - alpha) * r
-            speed[i] += beta * r / dt
-        else:
-            error[i] = speed[i] = 0.0
-        last[i] = distances[i] if fresh[i] else np.nan
-        approach = max(min(speed[i], 0.0), -fastest)
-        for j in range(3):
-            origin[i, j] = origins[i, j]
-            velocities[i, j] = approach * directions[i, j]
+    track: Array,
+) -> float:
+    """Velocity of spot i's point along its ray after this tick, <= 0: only what approaches counts [m/s].
+
+    Args:
+        i: Number of the spot.
+        d: Its reading [m].
+        fresh: Whether it is a reading of the same obstacle as before or of a new one; else the filter starts anew.
+        origin, direction: Of the spot now.
+        dt, alpha, beta, fastest, track: As in `ApproachVelocity`.
+    """  # fmt: skip
+    change = d - track[i, 0]
+    for j in range(3):
+        change += direction[j] * (origin[j] - track[i, 3 + j])
+        track[i, 3 + j] = origin[j]
+    if fresh and abs(change) < _JUMP * dt:  # NaN fails: no reading before
+        r = track[i, 1] + change - track[i, 2] * dt
+        track[i, 1] = (1.0 - alpha) * r
+        track[i, 2] += beta * r / dt
+    else:
+        track[i, 1] = track[i, 2] = 0.0
+    track[i, 0] = d if fresh else np.nan
+    return max(min(track[i, 2], 0.0), -fastest)

@@ -1,0 +1,96 @@
+"""How a task comes back to its path: rules, and offsets from the reference that fade smoothly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class RecoveryRules:
+    """How the robot returns to its path, and when it counts as returned.
+
+    Attributes:
+        speed, angular_speed, joint_speed: Peak speed of a return from rest [m/s], [rad/s], [rad/s]; what is left of the
+            evasive motion, at most as fast, runs out on top of it.
+        shortest: Least duration of a return [s], so that small ones stay gentle.
+        tolerance: Largest error norm at which a task counts as met [m or rad].
+        ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
+        enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
+
+    Raises:
+        ConfigurationError: A value is not a finite number > 0.
+    """
+
+    speed: float = 0.25
+    angular_speed: float = 0.8
+    joint_speed: float = 0.8
+    shortest: float = 0.4
+    tolerance: float = 5e-4
+    ramp: float = 0.2
+    enabled: bool = True
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.name != "enabled" and not (isinstance(value, int | float) and 0.0 < value < math.inf):
+                raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
+
+    def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
+        """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
+        if joints:
+            mean = float(np.abs(offset).max()) / self.joint_speed
+        else:
+            shift, turn = float(np.linalg.norm(offset[:3])), float(np.linalg.norm(offset[3:]))
+            mean = max(shift / self.speed, turn / self.angular_speed)
+        return max(15.0 / 8.0 * mean, self.shortest)
+
+    def slowed(self, rate: NDArray[np.float64], joints: bool) -> NDArray[np.float64]:
+        """The rate of an offset (6,) or (n,), no faster than a return."""
+        if joints:
+            return rate * min(1.0, self.joint_speed / max(float(np.abs(rate).max()), 1e-12))
+        linear, angular = max(float(np.linalg.norm(rate[:3])), 1e-12), max(float(np.linalg.norm(rate[3:])), 1e-12)
+        scale = min(1.0, self.speed / linear), min(1.0, self.angular_speed / angular)
+        return np.concatenate((scale[0] * rate[:3], scale[1] * rate[3:]))
+
+
+@dataclass(frozen=True, eq=False)
+class Return:
+    """The way back of one task: its offset from the reference, which fades by minimum jerk from the task's own speed.
+
+    Attributes:
+        offset: At the start (6,) or (n,).
+        speed: Rate of the offset at the start (6,) or (n,).
+        duration: [s].
+        time: Since the start [s].
+    """
+
+    offset: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    duration: float
+    time: float = 0.0
+
+    def displace(self, sample: Any) -> Any:
+        """The reference with what is left of the offset."""
+        T = self.duration
+        s, ds = minimum_jerk(self.time / T)
+        r, dr = run_out(self.time / T)
+        return sample.displaced((1.0 - s) * self.offset + r * T * self.speed, -ds / T * self.offset + dr * self.speed)
+
+
+def minimum_jerk(tau: float) -> tuple[float, float]:
+    """s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ and ds/dτ for τ in [0, 1]: from rest to rest."""
+    tau = min(max(tau, 0.0), 1.0)
+    return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2
+
+
+def run_out(tau: float) -> tuple[float, float]:
+    """r(τ) = τ - 6 τ³ + 8 τ⁴ - 3 τ⁵ and dr/dτ for τ in [0, 1]: from speed 1 to rest where it began, as smoothly."""
+    tau = min(max(tau, 0.0), 1.0)
+    return tau - tau**3 * (6.0 - 8.0 * tau + 3.0 * tau**2), 1.0 - tau**2 * (18.0 - 32.0 * tau + 15.0 * tau**2)
