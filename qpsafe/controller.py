@@ -213,7 +213,7 @@ class SafetyController:
         qd0 = self.evasion.step(torque).copy()
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
-        activations = self.activation.activations(cdf_n)
+        switches, activations, regime = self.activation.at(cdf_n)
         commanded = self.robot.at(self._q)
         samples = self.recovery.update(cdf_n, commanded, activations)
         wanted = [task.clik(commanded, sample) for task, sample in zip(self.tasks, samples, strict=True)]
@@ -237,7 +237,6 @@ class SafetyController:
             command = slowed(command, commanded, self.rules.speed_cap, box)
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
-        regime, switches = self.activation.regime(cdf_n), self.activation.switches(cdf_n)
         errors = tuple([clik.error for clik in wanted]) if self.recovery.on_path else self._errors(commanded)
         self._advance(command)
         return Tick(

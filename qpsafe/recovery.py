@@ -69,6 +69,7 @@ class Recovery:
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
+        self._last: list[Any] = [None] * len(self.tasks)  # state and reference of suspended tasks, last tick
         self._changed = True
         trajectories = {id(task.trajectory): task.trajectory for task in self.tasks}
         self._cursors = [
@@ -160,16 +161,16 @@ class Recovery:
             sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
         if not self._pending[k]:
             return sample
-        value = task.value(state)
         if self.phase == SUSPENDED:
-            self._offsets[k] = sample.offset(value) if sample.finite else None
+            self._last[k] = state, sample  # where the task is now: only the last tick's will be of interest
             return sample
+        value = task.value(state)
         if not sample.finite:  # never into an offset, which remembers
             raise ValueError(f"the trajectory of the {task.name} task is not finite")
         back = self._returns[k]
         if back is None:  # x_d,r is where the task is when it may return
             offset, joints = sample.offset(value), value.ndim == 1
-            before, self._offsets[k] = self._offsets[k], offset
+            before, self._offsets[k] = self._offset_before(k), offset
             if not active >= 1.0:  # held, not pulled
                 return sample.displaced(offset, np.zeros_like(offset))
             rate = (offset - before) / self.dt if before is not None else np.zeros_like(offset)
@@ -184,6 +185,13 @@ class Recovery:
             self._returns[k], self._pending[k] = None, False
             return sample
         return back.displace(sample)
+
+    def _offset_before(self, k: int) -> NDArray[np.float64] | None:
+        """Offset of task k at the last tick, None if it was not finite or there was none."""
+        if self._last[k] is not None:
+            (state, sample), self._last[k] = self._last[k], None
+            self._offsets[k] = sample.offset(self.tasks[k].value(state)) if sample.finite else None
+        return self._offsets[k]
 
     def _returned(self, activations: tuple[float, ...]) -> bool:
         return not any(pending and active >= 1.0 for pending, active in zip(self._pending, activations, strict=True))

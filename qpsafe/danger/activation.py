@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,20 @@ class Threshold:
 REGIME_NAMES = {1: ("high", "low"), 2: ("high", "medium", "low")}
 
 
+class Switching(NamedTuple):
+    """What a danger switches.
+
+    Attributes:
+        switches: m, f, ...
+        activations: a_1..a_N.
+        regime: Name of the danger level.
+    """
+
+    switches: tuple[float, ...]
+    activations: tuple[float, ...]
+    regime: str
+
+
 class Activation:
     """Activations 1 >= a_1 >= ... >= a_N >= 0 of N tasks, highest priority first, from the danger CDF_n.
 
@@ -80,6 +95,8 @@ class Activation:
         # the different ones, and the number of tasks that each one switches
         self.levels = tuple(threshold for threshold, _ in groupby(self.thresholds))
         self._counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
+        n = len(self.levels)
+        self._names = REGIME_NAMES.get(n, ("high", *(f"medium-{kept}" for kept in range(1, n)), "low"))
         for k in range(len(self.thresholds) - 1):
             upper, lower = self.thresholds[k], self.thresholds[k + 1]
             if lower != upper and lower.end > upper.start:
@@ -108,6 +125,22 @@ class Activation:
             result += [product] * count
         return tuple(result)
 
+    def at(self, cdf_n: float) -> Switching:
+        """Switches, activations and the regime's name, in one pass."""
+        if type(self) is not Activation:
+            return Switching(self.switches(cdf_n), self.activations(cdf_n), self.regime(cdf_n))
+        switches, activations = [], []
+        product, kept = 1.0, 0
+        for threshold, count in zip(self.levels, self._counts, strict=True):
+            if cdf_n <= threshold.start:
+                switches.append(1.0)
+                kept += 1
+            else:
+                switches.append(threshold(cdf_n))
+                product *= switches[-1]
+            activations += [product] * count
+        return Switching(tuple(switches), tuple(activations), self._names[kept])
+
     def kept(self, cdf_n: float) -> int:
         """Number of tasks not yet being released: N in low danger, 0 in high danger."""
         return sum([cdf_n <= threshold.start for threshold in self.thresholds])
@@ -118,10 +151,7 @@ class Activation:
         A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two different
         thresholds the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
         """
-        n, kept = len(self.levels), sum([cdf_n <= threshold.start for threshold in self.levels])
-        if n in REGIME_NAMES:
-            return REGIME_NAMES[n][kept]
-        return "high" if kept == 0 else "low" if kept == n else f"medium-{kept}"
+        return self._names[sum([cdf_n <= threshold.start for threshold in self.levels])]
 
 
 def regime_weights(activations: tuple[float, ...]) -> NDArray[np.float64]:

@@ -74,8 +74,9 @@ class HierarchicalLaw:
     def _solve_together(self, problem: LawProblem) -> LawResult | None:
         """All regimes in one compiled call, to the same bits; None where that is not possible."""
         tasks, qd0, activations, lower, upper, soft = problem
-        n, weights = len(qd0), regime_weights(activations)
-        if soft or lower is None or upper is None or not tasks or (self.projection == "paper" and weights[2:].any()):
+        n, above = len(qd0), (1.0, *activations)
+        weights = [a - b for a, b in zip(above, (*activations, 0.0), strict=True)]  # as regime_weights
+        if soft or lower is None or upper is None or not tasks or (self.projection == "paper" and any(weights[2:])):
             return None
         begin = perf_counter()
         matrices, targets = zip(*tasks, strict=True)
@@ -86,10 +87,10 @@ class HierarchicalLaw:
             return None  # plain NumPy says what is wrong
         if not (lower.shape == upper.shape == qd0.shape and len(weights) == len(tasks) + 1):
             return None
-        qd, x, info = self._solve_regimes(A, b, counts, weights, qd0, lower, upper, self.damping)
+        qd, x, info = self._solve_regimes(A, b, counts, np.array(weights), qd0, lower, upper, self.damping)
         regimes, status = [], "solved"
-        heads, share = info[:, :3].tolist(), (perf_counter() - begin) / np.count_nonzero(weights)
-        for kept, weight in enumerate(weights.tolist()):
+        heads, share = info[:, :3].tolist(), (perf_counter() - begin) / max(sum(map(bool, weights)), 1)
+        for kept, weight in enumerate(weights):
             if weight > 0.0:
                 code, turns, where = heads[kept]
                 packed = partial(_packed, problem, A, b, counts[:kept])

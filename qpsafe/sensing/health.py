@@ -46,7 +46,6 @@ class SpotHealth:
         self.dead: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
         #: Columns: the last reading, NaN for none, and the point it meant at first.
         self.seen = np.empty((count, 4))
-        self.codes, self._sick = self.counts[:, 0], self.counts[:, 1]
         self.reset()
 
     def reset(self) -> None:
@@ -59,7 +58,7 @@ class SpotHealth:
 
     def acknowledge(self) -> None:
         """Let spots that work again work, and the robot move if enough of them do."""
-        self.dead[:] = self._sick >= self.dead_ticks
+        self.dead[:] = self.counts[:, 1] >= self.dead_ticks
         self._dying = int(self.dead.sum())
         self.stopped = self._dying > self.most
         self._out = int((self.dead | (self.codes != HEALTHY)).sum())
@@ -68,6 +67,11 @@ class SpotHealth:
         """Take how many spots are dead, and how many dead or unusable, in this tick; `judge` has seen every spot."""
         self._dying, self._out = dead, out
         self.stopped |= dead > self.most
+
+    @property
+    def codes(self) -> NDArray[np.int64]:
+        """What is wrong with each spot's reading in this tick, (k,)."""
+        return self.counts[:, 0]
 
     @property
     def severity(self) -> str:

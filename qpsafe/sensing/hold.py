@@ -28,14 +28,13 @@ class PointHold:
         self.step = rules.approach_speed * dt
         #: Columns: distance at which each spot saw its point last, +inf for none, and the point.
         self.held = np.empty((count, 4))
-        self.seen = self.held[:, 0]
         self.age = np.empty(count, dtype=np.int64)  # ticks since then
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
         self.held[:], self.age[:] = 0.0, 0
-        self.seen[:] = np.inf
+        self.held[:, 0] = np.inf
 
 
 @inline

@@ -144,7 +144,7 @@ class DistanceSensing:
     @property
     def counted(self) -> Array:
         """Distance at which each spot saw the point of it that counts now, (k,) [m]; +inf where none counts."""
-        return self._hold.seen.copy()
+        return self._hold.held[:, 0].copy()
 
     def _notes(self) -> tuple[str, ...]:
         health, names = self.health, self.spots.names
