@@ -81,15 +81,19 @@ class Irc5Loop:
         loop: Of the experiment, e.g. `FixedLoop(experiment)`; taken over.
         exchange: The other end.
         settings: Of EGM; its control lag becomes the plant's.
+        period: After this time people begin anew [s]; None: never.
 
     Attributes:
         irc5: The simulated controller.
         running: Whether people and clocks of the experiment go on: from the first answer.
     """
 
-    def __init__(self, loop: Any, exchange: Exchange, settings: EgmSettings | None = None) -> None:
+    def __init__(
+        self, loop: Any, exchange: Exchange, settings: EgmSettings | None = None, period: float | None = None
+    ) -> None:
         settings = EgmSettings() if settings is None else settings
         self.loop = loop
+        self._period = None if period is None else round(period / loop.controller.dt)
         self.plant = Plant(loop.scene, lag=settings.lag, q=loop.plant.q)
         dt = loop.controller.dt
         self.irc5 = SimulatedIrc5(self.plant, settings, dt)
@@ -103,7 +107,7 @@ class Irc5Loop:
 
     def step(self) -> Any:
         """Sense and swap; what the experiment's own step returns."""
-        if not self.running:
+        if not self.running or self.loop.k == self._period:
             self.loop.k = 0
         return self.loop.step()
 

@@ -96,8 +96,8 @@ def irc5_sim(
     if lockstep and todo:
         raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
     found = load_robot(robot)
-    loop, length = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
-    length = length if duration is None else duration
+    loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
+    length = period if duration is None else duration
     exchange = UdpExchange(
         found.nq,
         (host, port),
@@ -106,7 +106,7 @@ def irc5_sim(
         seed=seed,
         lockstep=1.0 if lockstep else 0.0,
     )
-    run = Irc5Loop(loop, exchange, settings)
+    run = Irc5Loop(loop, exchange, settings, period)
     if real_time:
         screen.print(realtime.fifo(70).line, style="dim", highlight=False)
     realtime.fine_timers()

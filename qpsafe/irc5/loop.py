@@ -109,7 +109,12 @@ class StreamLoop:
         """Nothing has come from the robot for this long."""
         if seconds > self.rules.silence and self.supervisor.moving:
             self.stop(StopCategory.CONTROLLED_AND_HELD, f"{ROBOT}silent for {self.rules.silence:g} s")
-            self.supervisor.standstill(f"{ROBOT}hears nothing")
+
+    @property
+    def leaving(self) -> bool:
+        """Whether the stream ends: there is a stop of category 0 or 1."""
+        category = self.supervisor.category
+        return category is not None and category <= StopCategory.CONTROLLED_THEN_SILENT
 
     @property
     def over(self) -> bool:

@@ -30,10 +30,11 @@ STEADY = 5.0  # memory is compared from this time of the stream on [s]
 
 
 class TimedStreamer(EgmStreamer):
-    """A streamer that knows when the packet it answers arrived at this computer, waiting in the kernel included.
+    """A streamer that knows when the packets it answers arrived at this computer, waiting in the kernel included.
 
     Attributes:
-        arrived: Of the newest packet, on the real-time clock [ns].
+        arrived: Of the oldest packet since the last answer, on the real-time clock [ns]; 0 without one. The newest is
+            answered, but a delay in which several came must show in full.
         stamped: Whether the kernel says so; else it is when the packet was read.
     """
 
@@ -54,12 +55,13 @@ class TimedStreamer(EgmStreamer):
             except OSError:  # an earlier answer found nobody
                 self.counts["not_received"] += 1
                 continue
-            if self.session.offer(data, sender, now):
+            if self.session.offer(data, sender, now) and self.arrived == 0:
                 self.arrived = _stamp(notes) or time.time_ns()
 
     def since_arrival(self) -> float:
-        """How long ago the newest packet arrived [s]."""
-        return 1e-9 * (time.time_ns() - self.arrived)
+        """How long ago the oldest packet since the last call arrived [s]."""
+        arrived, self.arrived = self.arrived, 0
+        return 1e-9 * (time.time_ns() - arrived)
 
 
 def _stamp(notes: list[tuple[int, int, bytes]]) -> int:
@@ -76,7 +78,7 @@ class StreamRun:
     """What became of a stream.
 
     Attributes:
-        latency: From a packet's arrival to its answer's leaving.
+        latency: From the arrival of the oldest packet that was not answered to the answer's leaving.
         duration: From the first answer to the last [s].
         started: Memory in use in the steady state, `STEADY` after the first answer [byte].
         ended: Memory in use at the end [byte].
@@ -169,8 +171,7 @@ def run_stream(
                 loop.acknowledge("operator (SIGUSR1)")
             if cycle is None:
                 loop.silent(now - heard)
-                if loop.supervisor.silent:  # leaving, and nobody to ramp out for
-                    run.at_rest = loop.supervisor.category is not StopCategory.IMMEDIATE
+                if loop.leaving and (now - heard > loop.rules.silence or not began):  # nobody to ramp out for
                     break
                 continue
             heard = now

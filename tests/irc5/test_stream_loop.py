@@ -152,7 +152,7 @@ def test_a_silent_robot_stops_the_stream_until_it_starts_anew(cell: Cell) -> Non
     now = cell.here.loop
     for _ in range(30):
         cell.here.receive([], None)
-    assert cell.state is State.STOPPED
+    assert cell.state is State.STOPPING  # it cannot be braked before it listens again
     assert "silent" in cell.causes()
     cell.run(100)  # back on the line, as if nothing had been: that is no start
     assert cell.state is State.STOPPED
