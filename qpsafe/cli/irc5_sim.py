@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_module
 import math
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,6 +67,7 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
+    from qpsafe.irc5.run import Requests
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments import experiment_loop
     from qpsafe.sim.irc5_link import WireFaults
@@ -111,8 +113,8 @@ def irc5_sim(
         screen.print(realtime.fifo(70).line, style="dim", highlight=False)
     realtime.fine_timers()
     realtime.freeze_garbage()
-    screen.print(f"sending to {host}:{port}; Ctrl-C ends", highlight=False)
-    try:
+    with Requests().heard() as requests, closing(exchange):
+        screen.print(f"sending to {host}:{port}; Ctrl-C ends", highlight=False)
         result = run_robot(
             run,
             exchange,
@@ -121,9 +123,8 @@ def irc5_sim(
             keep=log is not None,
             todo=todo,
             progress=status if sys.stderr.isatty() and not json else None,
+            over=lambda: bool(requests.leave),
         )
-    finally:
-        exchange.close()
     if log is not None:
         write_text(log, table(result, found.joint_names))
     if json:
@@ -167,6 +168,8 @@ def show(run: RobotRun, screen: Console) -> None:
     """Print what the robot's end saw."""
     counts: dict[str, Any] = run.counts
     screen.print()
+    if run.counts["answered"] == 0:
+        screen.print("nobody answered", style="yellow")
     screen.print(f"{run.cycles} cycles, {run.late} of them more than 4 ms late themselves", highlight=False)
     screen.print(json_module.dumps(counts | {"rejected": run.rejected}), highlight=False)
     screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s", highlight=False)

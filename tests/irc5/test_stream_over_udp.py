@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -174,6 +175,7 @@ def test_a_simulated_robot_that_nobody_answers_says_so() -> None:
         assert line
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
     assert "Traceback" not in errors
+    assert json.loads(output)["counts"]["answered"] == 0
