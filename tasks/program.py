@@ -56,13 +56,17 @@ class Program:
                 raise ConfigurationError("Program", f"events[{k}]", name, "a name")
         #: Events of one cycle, in their order.
         self.events = tuple(sorted((Event(starts[place], name) for place, name in events), key=lambda e: e.time))
+        self._last: tuple[float, Sample] | None = None  # several tasks ask for the same time
 
     def sample(self, t: float) -> Sample:
         """Reference at time t [s]; at rest at the last goal after the end, unless it is a cycle."""
-        if self.cycle:
-            t %= self.duration
-        k = min(bisect_right(self._ends, t), len(self.moves) - 1)
-        return self.moves[k].sample(t - (self._ends[k - 1] if k else 0.0))
+        if self._last is not None and self._last[0] == t:
+            return self._last[1]
+        here = t % self.duration if self.cycle else t
+        k = min(bisect_right(self._ends, here), len(self.moves) - 1)
+        sample = self.moves[k].sample(here - (self._ends[k - 1] if k else 0.0))
+        self._last = (t, sample)
+        return sample
 
     def move_at(self, t: float) -> int:
         """Number of the move at time t [s]."""
