@@ -53,11 +53,11 @@ class Support(NamedTuple):
         margin: Beyond the outer holes.
     """
 
-    centre: tuple[float, float] = (0.42, 0.38)
-    columns: int = 4
+    centre: tuple[float, float] = (0.44, 0.40)
+    columns: int = 5
     rows: int = 2
     pitch: float = 0.05
-    hole: float = 0.012
+    hole: float = 0.010
     thickness: float = 0.036
     margin: float = 0.03
 
@@ -65,7 +65,7 @@ class Support(NamedTuple):
 class Box(NamedTuple):
     """The box that screws are dropped into: inner measures [m]."""
 
-    centre: tuple[float, float] = (0.42, -0.38)
+    centre: tuple[float, float] = (0.44, -0.40)
     length: float = 0.20
     width: float = 0.18
     height: float = 0.07
@@ -77,8 +77,8 @@ class Table(NamedTuple):
 
     name: str
     centre: tuple[float, float]
-    length: float = 0.48
-    width: float = 0.36
+    length: float = 0.38
+    width: float = 0.32
     thickness: float = 0.04
 
 
@@ -94,8 +94,8 @@ class Cell:
 
     support: Support = field(default_factory=Support)
     box: Box = field(default_factory=Box)
-    tables: tuple[Table, ...] = (Table("left table", (0.44, 0.40)), Table("right table", (0.44, -0.40)))
-    full: int = 8
+    tables: tuple[Table, ...] = (Table("left table", (0.49, 0.43)), Table("right table", (0.49, -0.43)))
+    full: int = 10
     carried: int = 0
 
     @property
@@ -126,7 +126,7 @@ class Cell:
         for geom in spec.geoms:
             if geom.group == ROBOT_COLLISION:
                 geom.contype = geom.conaffinity = 0
-        add_camera(spec.worldbody, CAMERA, [2.75, -1.0, 1.75], [0.30, 0.05, 0.40], 34.0)
+        add_camera(spec.worldbody, CAMERA, [3.3, -0.75, 1.75], [0.30, 0.0, 0.26], 34.0)
         for table in self.tables:
             _add_table(spec.worldbody, table, self._floor(spec))
         _add_support(spec.worldbody, self)

@@ -58,7 +58,7 @@ def test_a_screw_is_gripped_only_where_the_tip_touches_it(scene: Scene, parts: P
     plant.advance(0.3)
     gripper = Gripper(scene, parts)
     assert gripper.grip(plant.data) == (5 if held else None)
-    assert list(plant.data.eq_active[parts.welds]) == [k == 5 and held for k in range(8)]
+    assert list(plant.data.eq_active[parts.welds]) == [k == 5 and held for k in range(CELL.screws)]
     up = joints_for(ROBOT, "tcp", _pose(CELL.holes[5] + [off, 0.0, 0.1]), plant.q)
     start = plant.q
     for share in np.linspace(0.0, 1.0, 200):
