@@ -22,6 +22,7 @@ from qpsafe.cli.common import (
 )
 from qpsafe.cli.demo_fast import fast_person
 from qpsafe.cli.demo_path import path
+from qpsafe.cli.demo_pick import pick_and_place
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -230,3 +231,4 @@ def show(report: Report, title: str, screen: Console) -> None:
 
 app.command()(path)
 app.command("fast-person")(fast_person)
+app.command("pick-and-place")(pick_and_place)
