@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import qpsafe
-from qpsafe.sim.fast_person import fast_figure, runs
+from qpsafe.sim.fast_person import at_speed, fast_figure, runs
+from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.scene import build_scene
 from qpsafe.sim.story_file import load_story
 from qpsafe.sim.story_plots import plan_figure
@@ -50,10 +51,31 @@ def fast_person() -> None:
     fast_figure(list(runs(qpsafe.load_robot("irb140"))), IMG / "fast-person.png")
 
 
+def fast_person_frames() -> None:
+    """Six moments of the first experiment with somebody at 2.0 m/s."""
+    import tempfile
+
+    from PIL import Image
+
+    from qpsafe.sim.film import Film
+
+    robot, story = qpsafe.load_robot("irb140"), at_speed(2.0)
+    experiment = FixedExperiment(robot, story=story, duration=4.04)
+    spots, frames = qpsafe.load_spots(robot), []
+    assert spots is not None
+    with tempfile.TemporaryDirectory() as folder:
+        with Film(Path(folder) / "film.mp4", experiment.scene, spots, qpsafe.Activation()) as film:
+            experiment.run(lambda *state: frames.append(film.observe(*state)))
+    shown = [frames[10 * round(t / 0.04)] for t in (2.0, 2.8, 3.04, 3.2, 3.36, 4.0)]
+    sheet = np.vstack([np.hstack(shown[:3]), np.hstack(shown[3:])])
+    Image.fromarray(sheet).resize((1440, 540)).save(IMG / "fast-person-frames.png")
+
+
 FIGURES: dict[str, Callable[[], None]] = {
     "stories-plan": stories_plan,
     "stories-people": stories_people,
     "fast-person": fast_person,
+    "fast-person-frames": fast_person_frames,
 }
 
 if __name__ == "__main__":
