@@ -63,9 +63,11 @@ def fast_person_frames() -> None:
     experiment = FixedExperiment(robot, story=story, duration=4.04)
     spots, frames = qpsafe.load_spots(robot), []
     assert spots is not None
-    with tempfile.TemporaryDirectory() as folder:
-        with Film(Path(folder) / "film.mp4", experiment.scene, spots, qpsafe.Activation()) as film:
-            experiment.run(lambda *state: frames.append(film.observe(*state)))
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Film(Path(folder) / "film.mp4", experiment.scene, spots, qpsafe.Activation()) as film,
+    ):
+        experiment.run(lambda *state: frames.append(film.observe(*state)))
     shown = [frames[10 * round(t / 0.04)] for t in (2.0, 2.8, 3.04, 3.2, 3.36, 4.0)]
     sheet = np.vstack([np.hstack(shown[:3]), np.hstack(shown[3:])])
     Image.fromarray(sheet).resize((1440, 540)).save(IMG / "fast-person-frames.png")
