@@ -1,6 +1,10 @@
 """The closed loop over the wire, with two processes, against the same loop in one process.
 
-python benchmarks/bench_wire.py [--experiment fixed] [--duration 60] [--json FILE]
+python benchmarks/bench_wire.py [--experiment fixed] [--duration 60] [--real-time] [--json FILE]
+
+In lock-step the robot waits for every answer, so that the wire has no delay. In real time an answer acts one cycle
+after the packet that it answers, so the run in one process is given the same delay; what is left are cycles without
+an answer in time.
 """
 
 from __future__ import annotations
@@ -9,15 +13,17 @@ import argparse
 import json
 from pathlib import Path
 
+from qpsafe.irc5.realtime import fifo
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5_compare import agreement, in_one_process, over_the_wire
 from qpsafe.sim.irc5_motion import EgmSettings
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="fixed")
     parser.add_argument("--duration", type=float, default=60.0)
+    parser.add_argument("--real-time", action="store_true", help="SCHED_FIFO for both processes")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     name, duration = arguments.experiment, arguments.duration
@@ -28,7 +34,10 @@ def main() -> None:
     print(f"{name}, {duration:g} s, joints move by up to {exact.moved:.3f} rad")
     print(f"lock-step, {seen.counts['answered']} answers: largest difference {exact.largest:.3g} rad")
     late = in_one_process(name, robot, duration, settings, delay=1)
-    wire, seen, report = over_the_wire(name, robot, duration, settings, lockstep=False)
+    if arguments.real_time:
+        print(fifo(70).line)
+    options = ["--real-time"] if arguments.real_time else []
+    wire, seen, report = over_the_wire(name, robot, duration, settings, *options, lockstep=False)
     free = agreement(wire, late, most=25)
     straight = agreement(wire, here, most=25)
     counts = f"{seen.counts['answered']} answered, {seen.counts['missed']} missed, {seen.late} cycles late themselves"

@@ -28,15 +28,18 @@ class Program:
         moves: At least one; each begins where the one before it ends.
         events: Pairs of the number of the move before which it happens, and its name.
         cycle: Whether to begin again at the end, for ever.
+        frame: Of the robot, that is to follow it; empty where the program does not say.
 
     Raises:
         ConfigurationError: No moves, a gap between two of them, an event that belongs nowhere, a cycle not closed.
     """
 
-    def __init__(self, moves: Sequence[Move], events: Sequence[tuple[int, str]] = (), cycle: bool = False) -> None:
+    def __init__(
+        self, moves: Sequence[Move], events: Sequence[tuple[int, str]] = (), cycle: bool = False, frame: str = ""
+    ) -> None:
         if not moves:
             raise ConfigurationError("Program", "moves", moves, "at least one move")
-        self.moves, self.cycle = tuple(moves), cycle
+        self.moves, self.cycle, self.frame = tuple(moves), cycle, frame
         followers = [*self.moves[1:], *self.moves[:1]] if cycle else self.moves[1:]
         for k, (move, after) in enumerate(zip(self.moves, followers, strict=False)):
             gap = np.abs(after.sample(0.0).pose - move.sample(move.duration).pose).max()

@@ -132,7 +132,7 @@ class _Builder:
         if not moves:
             raise self.wrong(["segment"], "only events", "at least one move or dwell")
         try:
-            return Program(moves, events, self.file.cycle)
+            return Program(moves, events, self.file.cycle, self.file.frame)
         except ConfigurationError as problem:
             raise self.wrong(["cycle"], self.file.cycle, f"an end at the start; {problem.expected}") from None
 

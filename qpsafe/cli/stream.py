@@ -163,9 +163,12 @@ def _controller(
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller
     known = () if cell is None else load_cell(cell)
-    goal: Any = FixedPose(found.pose("tcp", found.home)) if program is None else load_program(program, found)
-    frame = getattr(goal, "frame", "tcp")
-    return SafetyController(found, [PositionTask(frame, goal), OrientationTask(frame, goal)], law, known=known)
+    tool = found.tool_frames[0]
+    goal: Any = FixedPose(found.pose(tool, found.home))
+    if program is not None:
+        goal = load_program(program, found)
+        tool = goal.frame or tool
+    return SafetyController(found, [PositionTask(tool, goal), OrientationTask(tool, goal)], law, known=known)
 
 
 def _grants(real_time: bool, priority: int) -> list[Grant]:

@@ -87,11 +87,11 @@ def show(result: dict[str, Any], screen: Console) -> None:
         screen.print("the robot never spoke", style="yellow")
         return
     table = Table(title=f"{result['duration']:.1f} s, {result['packets']} packets of the robot")
-    for heading in ("answered in time", "missed", "p50", "p99", "p99.9", "maximum"):
+    for heading in ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"):
         table.add_column(heading, justify="right")
     share = 100.0 * result["missed"] / max(result["packets"], 1)
     times = (f"{1e3 * response[key]:.3f} ms" for key in ("p50", "p99", "p99.9", "maximum"))
-    table.add_row(str(result["answered_in_time"]), f"{result['missed']} ({share:.3f} %)", *times)
+    table.add_row(str(result["answered_in_time"]), str(result["missed"]), f"{share:.3f} %", *times)
     screen.print(table)
     for name, count in result["missed_parts"].items():
         screen.print(f"  missed, {name}: {count}", highlight=False)

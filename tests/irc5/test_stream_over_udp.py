@@ -25,6 +25,7 @@ from qpsafe.sim.irc5_loop import Irc5Loop
 from qpsafe.sim.irc5_motion import EgmSettings
 from qpsafe.sim.irc5_process import happenings, run_robot
 from qpsafe.sim.irc5_udp import NoAnswerError, UdpExchange
+from qpsafe.sim.path import PROGRAM as PROGRAM_FILE
 
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
 
@@ -179,3 +180,17 @@ def test_a_simulated_robot_that_nobody_answers_says_so() -> None:
     assert process.returncode == 1
     assert "Traceback" not in errors
     assert json.loads(output)["counts"]["answered"] == 0
+
+
+def test_a_program_moves_the_frame_that_it_names(tmp_path: Path) -> None:
+    from qpsafe.cli.stream import _controller
+
+    text = PROGRAM_FILE.read_text(encoding="utf-8").replace('"tcp"', '"flange"')
+    path = tmp_path / "flange.toml"
+    path.write_text(text.replace("0.54", "0.60"), encoding="utf-8")
+    named = _controller("irb140", path, None, None, None)
+    assert [task.frame for task in named.tasks] == ["flange", "flange"]  # type: ignore[attr-defined]
+    by_default = _controller("irb140", None, None, None, None)
+    assert [task.frame for task in by_default.tasks] == ["tcp", "tcp"]  # type: ignore[attr-defined]
+    there = by_default.tasks[0].trajectory.sample(0.0).pose
+    assert np.allclose(there, named.robot.pose("tcp", named.robot.home))
