@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.path import PathExperiment
+from qpsafe.sim.pick_loop import PickLoop
+from qpsafe.sim.pick_place import PickPlaceExperiment
 
 if TYPE_CHECKING:
     from qpsafe.laws.problem import Law
@@ -19,12 +21,16 @@ class ExperimentName(StrEnum):
 
     fixed = "fixed"
     path = "path"
+    pick_and_place = "pick-and-place"
 
 
 def experiment_loop(
     name: str, robot: Robot, law: Law | None = None, seed: int = 0, sensor: str = "ideal"
 ) -> tuple[Any, float]:
     """A loop with `controller`, `plant`, `scene`, `step` and `advance`, and how long the experiment takes [s]."""
+    if name == ExperimentName.pick_and_place:
+        third = PickPlaceExperiment(robot, law, seed=seed, sensor=sensor)
+        return PickLoop(third), third.duration
     kind = {ExperimentName.fixed: FixedExperiment, ExperimentName.path: PathExperiment}[ExperimentName(name)]
     experiment = kind(robot, law, seed=seed, sensor=sensor)
     return FixedLoop(experiment), experiment.duration

@@ -140,16 +140,12 @@ def over_the_wire(
     name: str, robot: Robot, duration: float, settings: EgmSettings, *options: str, lockstep: bool
 ) -> tuple[Array, RobotRun, dict[str, Any]]:
     """The same with `qpsafe stream` in a process of its own: positions, what the robot saw, the stream's report."""
-    with stream_process("--experiment", name, *options) as stream:
-        addresses = stream.addresses
-        exchange = UdpExchange(
-            robot.nq, addresses["the robot"], addresses["distances"], lockstep=5.0 if lockstep else 0.0
-        )
-        try:
+    with contextlib.closing(UdpExchange(robot.nq, None, lockstep=5.0 if lockstep else 0.0)) as exchange:
+        events = "{}:{}".format(*exchange.events)
+        with stream_process("--experiment", name, "--events", events, *options) as stream:
+            exchange.aim(stream.addresses["the robot"], stream.addresses["distances"])
             run = Irc5Loop(experiment_loop(name, robot)[0], exchange, settings)
             seen = run_robot(run, exchange, duration, lockstep=lockstep, keep=True)
-        finally:
-            exchange.close()
     return np.array(seen.q[: round(duration / 0.004)]), seen, stream.report
 
 

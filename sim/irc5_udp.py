@@ -28,7 +28,7 @@ class UdpExchange:
 
     Args:
         joints: How many the robot has.
-        stream: Address of `qpsafe stream`.
+        stream: Address of `qpsafe stream`; None: `aim` tells it later.
         sensors: Where distances go, None for nowhere.
         faults: Of the wire, both ways.
         strangers: Share of cycles in which somebody else sends a packet with other joint values.
@@ -45,7 +45,7 @@ class UdpExchange:
     def __init__(
         self,
         joints: int,
-        stream: tuple[str, int],
+        stream: tuple[str, int] | None,
         sensors: tuple[str, int] | None = None,
         *,
         faults: WireFaults = NO_FAULTS,
@@ -57,7 +57,7 @@ class UdpExchange:
     ) -> None:
         if not 0.0 <= strangers <= 1.0:
             raise ConfigurationError("UdpExchange", "strangers", strangers, "0 to 1")
-        self._n, self._stream, self.strangers = joints, stream, strangers
+        self._n, self.strangers = joints, strangers
         self._socket, self._stranger, self._events = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in "123")
         try:
             self._events.bind(("127.0.0.1", event_port))
@@ -66,11 +66,19 @@ class UdpExchange:
         for each in (self._socket, self._stranger, self._events):
             each.setblocking(False)
         self.events: tuple[str, int] = self._events.getsockname()
-        self._sensors = None if sensors is None else SensorOutput(*sensors)
+        self._sensors: SensorOutput | None = None
+        self._stream = ("127.0.0.1", 9)  # discard
+        if stream is not None:
+            self.aim(stream, sensors)
         self._rng = np.random.default_rng((seed, 7))
         self.out, self.back = (Wire(faults, np.random.default_rng((seed, k))) for k in range(2))
         self._lockstep, self._patience = lockstep, patience
         self.rejected = 0
+
+    def aim(self, stream: tuple[str, int], sensors: tuple[str, int] | None) -> None:
+        """Tell where the other end listens."""
+        self._stream = stream
+        self._sensors = None if sensors is None else SensorOutput(*sensors)
 
     def close(self) -> None:
         """Close all sockets."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_module
 import math
 import sys
+from collections import Counter
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -108,7 +109,8 @@ def irc5_sim(
         seed=seed,
         lockstep=1.0 if lockstep else 0.0,
     )
-    run = Irc5Loop(loop, exchange, settings, period)
+    again = None if experiment is Experiment.pick_and_place else period  # screws that were delivered stay there
+    run = Irc5Loop(loop, exchange, settings, again)
     if real_time:
         screen.print(realtime.fifo(70).line, style="dim", highlight=False)
     realtime.fine_timers()
@@ -127,10 +129,13 @@ def irc5_sim(
         )
     if log is not None:
         write_text(log, table(result, found.joint_names))
+    parts = Counter(loop.whereabouts()) if hasattr(loop, "whereabouts") else None
     if json:
-        print_json(result.to_dict())
+        print_json(result.to_dict() | {"parts": parts})
     else:
         show(result, screen)
+        if parts is not None:
+            screen.print("screws: " + ", ".join(f"{place} {n}" for place, n in parts.items()), highlight=False)
     if result.counts["answered"] == 0:
         raise typer.Exit(1)
 

@@ -24,6 +24,7 @@ class Experiment(StrEnum):
 
     fixed = "fixed"
     path = "path"
+    pick_and_place = "pick-and-place"
 
 
 class Acknowledge(StrEnum):
@@ -55,8 +56,8 @@ def stream(
         bool, typer.Option("--sensors/--no-sensors", help="Without, the robot sees nobody: for tests only.")
     ] = True,
     events: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Where names of the program's events are sent.")
-    ] = None,
+        str, typer.Option(metavar="HOST:PORT", help="Where names of the program's events are sent; empty: nowhere.")
+    ] = "127.0.0.1:6512",
     duration: Annotated[float | None, typer.Option(min=0.1, help="Leave after this time of streaming [s].")] = None,
     ramp_in: Annotated[float, typer.Option(min=0.01, max=10.0, help="Blending in from the measured pose [s].")] = 0.5,
     ramp_out: Annotated[float, typer.Option(min=0.01, max=10.0, help="Shortest time of braking [s].")] = 0.2,
@@ -98,7 +99,7 @@ def stream(
     with ExitStack() as stack:
         requests = stack.enter_context(Requests().heard())
         writer = None if log is None else stack.enter_context(ReferenceWriter(log, controller.robot.nq))
-        output = None if events is None else EventOutput(events)
+        output = EventOutput(events) if events else None
         inlet: SensorInput | None = None
         if not blind:
             assert controller.spots is not None

@@ -54,6 +54,17 @@ def test_over_the_wire_as_in_one_process(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_the_third_experiment_grips_over_the_wire() -> None:
+    """Pick and place with two processes: a screw is gripped when the program's event arrives, and held."""
+    robot, settings = load_robot("irb140"), EgmSettings()
+    wire, seen, report = over_the_wire("pick-and-place", robot, 4.0, settings, lockstep=True)
+    assert [name for _, name in seen.events] == ["grip"]
+    assert seen.counts["missed"] == 0
+    assert report["good"] is True
+    assert agreement(wire, in_one_process("pick-and-place", robot, 4.0, settings)).largest == 0.0
+
+
+@pytest.mark.slow
 def test_bad_wire_restart_and_motors_off_over_real_sockets() -> None:
     """Everything at once, in real time: the stream goes on, and ends at rest."""
     robot = load_robot("irb140")
