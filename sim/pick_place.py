@@ -139,6 +139,11 @@ class PickPlaceExperiment:
         return build_scene(self.robot, people=people, furnish=self.cell.furnish)
 
     @cached_property
+    def program_text(self) -> str:
+        """What the program's file says."""
+        return self.program.read_text(encoding="utf-8")
+
+    @cached_property
     def reference(self) -> Program:
         """The tool's program."""
         return load_program(self.program, self.robot)

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.run_file import RunFile, RunFileError, fingerprint, versions
-from qpsafe.sim.settings import controller_of, experiment_of
+from qpsafe.sim.settings import Experiment, controller_of, experiment_of
 from qpsafe.tick import Tick
 
 #: Called with every tick of a replay: its number and the tick.
@@ -67,7 +66,7 @@ class Replay:
         return {**vars(self), "first": first, "changed": list(self.changed), "same": self.same}
 
 
-def replay(run: RunFile, watcher: Watcher | None = None, experiment: FixedExperiment | None = None) -> Replay:
+def replay(run: RunFile, watcher: Watcher | None = None, experiment: Experiment | None = None) -> Replay:
     """Replay a run.
 
     Args:
@@ -105,7 +104,7 @@ def replay(run: RunFile, watcher: Watcher | None = None, experiment: FixedExperi
     return Replay(run.ticks, different, first, largest, changed(run, experiment))
 
 
-def changed(run: RunFile, experiment: FixedExperiment) -> tuple[str, ...]:
+def changed(run: RunFile, experiment: Experiment) -> tuple[str, ...]:
     """What is not as it was when the run was recorded."""
     now = versions()
     found = [

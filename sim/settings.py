@@ -24,32 +24,39 @@ from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.path import PathExperiment
 from qpsafe.sim.person import Board, Person
+from qpsafe.sim.pick_loop import PickLoop
+from qpsafe.sim.pick_place import PickPlaceExperiment
+from qpsafe.sim.settings_pick import KIND, pick_of, pick_settings
 from qpsafe.sim.story import StepProblem, Story
 from qpsafe.sim.story_steps import StoryTable
 
+Experiment = FixedExperiment | PickPlaceExperiment
 PLAIN = ("seed", "lag", "limits", "duration", "sensor", "cap")
 
 
-def settings_of(experiment: FixedExperiment) -> dict[str, Any]:
+def settings_of(experiment: Experiment) -> dict[str, Any]:
     """Everything that defines a run, for JSON.
 
     Raises:
         ConfigurationError: The law is one of the user's own, or the body differs from the source's person: replay could
             not build it again.
     """
-    kind = {FixedExperiment: "fixed", PathExperiment: "path"}.get(type(experiment))
+    kind = {FixedExperiment: "fixed", PathExperiment: "path", PickPlaceExperiment: KIND}.get(type(experiment))
     if kind is None:
         raise ConfigurationError(
             "settings_of", "experiment", type(experiment).__name__, "one of the demos' experiments"
         )
     robot, story = experiment.robot, experiment.story
-    found: dict[str, Any] = {name: getattr(experiment, name) for name in PLAIN}
-    found |= {
-        "kind": kind,
+    found: dict[str, Any] = {
         "robot": robot.name if robot.name in bundled_robots() else str(robot.folder),
         "law": law_settings(experiment.law),
         "rules": None if experiment.rules is None else asdict(experiment.rules),
         "recovery": None if experiment.recovery is None else asdict(experiment.recovery),
+    }
+    if isinstance(experiment, PickPlaceExperiment):
+        return found | pick_settings(experiment)
+    found |= {name: getattr(experiment, name) for name in PLAIN} | {
+        "kind": kind,
         "story": None if story is None else {"floor": story.floor, **story.table.model_dump(mode="json")},
         "choreography": _choreography(experiment.choreography) if story is None else None,
     }
@@ -58,7 +65,7 @@ def settings_of(experiment: FixedExperiment) -> dict[str, Any]:
     return found
 
 
-def experiment_of(settings: Mapping[str, Any]) -> FixedExperiment:
+def experiment_of(settings: Mapping[str, Any]) -> Experiment:
     """The experiment that settings describe.
 
     Raises:
@@ -66,10 +73,12 @@ def experiment_of(settings: Mapping[str, Any]) -> FixedExperiment:
     """
     try:
         robot = load_robot(settings["robot"])
-        options: dict[str, Any] = {name: settings[name] for name in PLAIN}
-        options["law"] = law_of(settings["law"])
+        options: dict[str, Any] = {"law": law_of(settings["law"])}
         for name, make in (("rules", SensingRules), ("recovery", RecoveryRules)):
             options[name] = None if settings[name] is None else make(**settings[name])
+        if settings["kind"] == KIND:
+            return pick_of(robot, settings, options)
+        options |= {name: settings[name] for name in PLAIN}
         if settings["story"] is not None:
             options["story"] = _story_of(settings["story"])
         else:
@@ -80,11 +89,13 @@ def experiment_of(settings: Mapping[str, Any]) -> FixedExperiment:
             return _with_program(settings["program"], lambda path: PathExperiment(robot, program=path, **options))
     except (KeyError, TypeError, AttributeError) as problem:
         raise ConfigurationError("the recorded settings", str(problem), None, "a complete set") from None
-    raise ConfigurationError("the recorded settings", "kind", settings["kind"], "fixed or path")
+    raise ConfigurationError("the recorded settings", "kind", settings["kind"], f"fixed, path or {KIND}")
 
 
-def controller_of(experiment: FixedExperiment) -> SafetyController:
+def controller_of(experiment: Experiment) -> SafetyController:
     """The controller that a run of the experiment starts with."""
+    if isinstance(experiment, PickPlaceExperiment):
+        return PickLoop(experiment).controller
     return FixedLoop(experiment).controller
 
 

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.run_file import FPS, RunFile, RunFileError
+from qpsafe.sim.settings import Experiment
 
 
 class Stage:
@@ -20,7 +20,7 @@ class Stage:
         data: The state shown last.
     """
 
-    def __init__(self, run: RunFile, experiment: FixedExperiment) -> None:
+    def __init__(self, run: RunFile, experiment: Experiment) -> None:
         """Prepare.
 
         Raises:

@@ -110,10 +110,14 @@ def _first(
 ) -> PickRun:
     """The run that is shown, filmed if wanted."""
     from qpsafe.cli.demo import observed
+    from qpsafe.sim.run_file import StateRecorder, write_run
+    from qpsafe.sim.settings import settings_of
 
-    label = f"seed {experiment.seed}, 250 Hz"
-    with observed(experiment, out / "video.mp4", video, view, screen, progress, label) as (observer, _):  # type: ignore[arg-type]
-        return experiment.run(observer)
+    label, states = f"seed {experiment.seed}, 250 Hz", StateRecorder()
+    with observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, _):  # type: ignore[arg-type]
+        run = experiment.run(observer)
+    write_run(out / "run.npz", run.log, settings_of(experiment), experiment.robot, states)
+    return run
 
 
 def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Console) -> list[str]:
@@ -125,7 +129,7 @@ def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Con
     run.log.write_csv(out / "signals.csv")
     names = [person.name for person in experiment.people]
     timeline(run, names, out / "figure.png", f"Third experiment, seed {experiment.seed}")
-    files = ["signals.csv", "figure.png"]
+    files = ["signals.csv", "figure.png", "run.npz"]
     available, reason = gl_available()
     if not available:
         screen.print(f"no snapshots: {reason}", style="yellow", highlight=False)

@@ -18,6 +18,7 @@ from qpsafe.sim.choreography import Approach, Choreography
 from qpsafe.sim.encounter import encounter
 from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.path import PathExperiment
+from qpsafe.sim.pick_place import PEOPLE, PickPlaceExperiment
 from qpsafe.sim.replay import replay
 from qpsafe.sim.run_file import INPUTS, OUTPUTS, RunFile, RunFileError, StateRecorder, read_run, write_run
 from qpsafe.sim.settings import experiment_of, settings_of
@@ -196,6 +197,21 @@ def test_settings_survive_json(experiment: FixedExperiment) -> None:
         for a, b in zip(experiment.walk.poses(t), again.walk.poses(t), strict=True):
             assert np.array_equal(a.ends, b.ends)
         assert np.array_equal(experiment.reference.sample(t).pose, again.reference.sample(t).pose)
+
+
+@pytest.mark.parametrize("people", [PEOPLE, None])
+def test_the_third_experiment_is_recorded_and_replayed_too(tmp_path: Path, people: Path | None) -> None:
+    experiment = PickPlaceExperiment(ROBOT, people_file=people, seed=3, limit=0.4)
+    states = StateRecorder()
+    log = experiment.run(states.observe).log
+    write_run(tmp_path / "run.npz", log, settings_of(experiment), ROBOT, states)
+    run = read_run(tmp_path / "run.npz")
+    again = experiment_of(run.header["settings"])
+    assert settings_of(again) == settings_of(experiment)
+    assert replay(run, experiment=again).same
+    stage = Stage(run, again)  # screws and people are where they were
+    assert stage.show(0)
+    assert stage.data.qpos.shape == (experiment.scene.model.nq,)
 
 
 def test_a_law_of_ones_own_cannot_be_recorded() -> None:
