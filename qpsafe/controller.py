@@ -5,22 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING
+from operator import is_not
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.checks import check_arguments, check_parts, checked_activation, checked_spots, checked_velocity
+from qpsafe.checks import check_arguments, check_parts, checked_activation, checked_spots
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push
 from qpsafe.laws.hierarchical import HierarchicalLaw
-from qpsafe.laws.problem import Law, LawProblem, TaskVelocity
-from qpsafe.limits import Box, JointLimits
+from qpsafe.laws.problem import Law
+from qpsafe.limits import JointLimits
 from qpsafe.recovery import Recovery, RecoveryRules
 from qpsafe.reference import JointReference
+from qpsafe.resolve import Resolver, judged, resolve
 from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -94,6 +96,9 @@ class SafetyController:
         self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known) if self.spots else None
         self.barrier = barrier
         self.recovery_rules = RecoveryRules() if recovery is None else recovery
+        self._quick: Resolver | None = None
+        self._quick_for: tuple[Any, ...] = ()
+        self._resolver()  # compiles now if need be, not within the first tick
         self.reset()
 
     def reset(self) -> None:
@@ -216,20 +221,18 @@ class SafetyController:
         switches, activations, regime = self.activation.at(cdf_n)
         commanded = self.robot.at(self._q)
         samples = self.recovery.update(cdf_n, commanded, activations)
-        wanted = [task.clik(commanded, sample) for task, sample in zip(self.tasks, samples, strict=True)]
-        tasks = tuple([TaskVelocity(jacobian, velocity) for jacobian, velocity, _ in wanted])
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        box = self.limits.box(self._q, self._qd, self._qdd) if self.limits else None
-        lower, upper = (box.lower.copy(), box.upper.copy()) if box else (None, None)
-        barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
-        soft = (barrier,) if barrier else ()
-        result = self.law.solve(LawProblem(tasks, qd0.copy(), activations, lower, upper, soft))
-        status, messages, command = self._inside(checked_velocity(result, self._q, self.dt), box)
-        if result.status != "solved":
-            status, messages = DEGRADED, (*messages, f"law: {result.status}")
-        if seen.notes:
-            status, messages = DEGRADED, (*messages, *seen.notes)
+        quick = None if self.barrier else self._resolver()
+        resolved = None if quick is None else quick(commanded, self._qd, samples, qd0, activations)
+        if resolved is None:
+            box = self.limits.box(self._q, self._qd, self._qdd) if self.limits else None
+            barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
+            soft = (barrier,) if barrier else ()
+            resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
+        command, excess, box, result, errors = resolved
+        usual = excess <= 1e-9 and result.status == "solved"
+        messages = () if usual else judged(resolved, self.robot.joint_names)
         if self.barrier:  # exact, as far as the acceleration limits allow
             command = self.barrier.scale(measured, command, seen.points).factor * command
             command = box.clip(command) if box else command
@@ -237,7 +240,9 @@ class SafetyController:
             command = slowed(command, commanded, self.rules.speed_cap, box)
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
-        errors = tuple([clik.error for clik in wanted]) if self.recovery.on_path else self._errors(commanded)
+        if not self.recovery.on_path:
+            errors = self._errors(commanded)
+        messages = (*messages, *seen.notes)
         self._advance(command)
         return Tick(
             reference=self._reference(),
@@ -247,7 +252,7 @@ class SafetyController:
             activations=activations,
             regime=regime,
             phase=self.recovery.phase,
-            status=status,
+            status=DEGRADED if messages else OK,
             messages=messages,
             qd0=qd0,
             points=seen.points,
@@ -261,19 +266,13 @@ class SafetyController:
             joint_names=self.robot.joint_names,
         )
 
-    def _inside(self, qd: NDArray[np.float64], box: Box | None) -> tuple[str, tuple[str, ...], NDArray[np.float64]]:
-        """The law's velocity, clipped to the box where it knew no limits, with status and messages."""
-        if box is None:
-            return OK, (), qd.copy()
-        command, excess = box.admit(qd)
-        if excess <= 1e-9:
-            return OK, (), command
-        messages = box.notes(self.robot.joint_names)
-        beyond = np.abs(command - qd)
-        if beyond.max() > 1e-9:
-            names = [name for name, e in zip(self.robot.joint_names, beyond, strict=True) if e > 1e-9]
-            messages = (*messages, "the law exceeded the limits, clipped: " + ", ".join(names))
-        return (DEGRADED if messages else OK), messages, command
+    def _resolver(self) -> Resolver | None:
+        """Tasks, limits and law as one compiled call, where they are of the built-in kind."""
+        parts = (self.tasks, self.law, self.limits)
+        if not self._quick_for or any(map(is_not, self._quick_for, parts)):  # at first, and when somebody exchanged one
+            self._quick = Resolver(self.robot, *parts) if Resolver.fits(*parts) else None  # type: ignore[arg-type]
+            self._quick_for = parts
+        return self._quick
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""

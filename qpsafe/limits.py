@@ -167,8 +167,8 @@ def _position_bound(s, a, dt, return_speed):  # type: ignore[no-untyped-def]
 _read, _bounds, _kinds = readable(1), types.float64[:, ::1], types.int64[:, ::1]
 
 
-@entry(types.void(*[_read] * 6, types.float64, types.float64, _bounds, _kinds))
-def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  # type: ignore[no-untyped-def]
+@inline
+def box_into(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  # type: ignore[no-untyped-def]
     """Fill bounds (2, n) with lower and upper speeds, kinds (3, n) with the codes of Box; one joint at a time."""
     for i in range(len(q)):
         a = a_max[i]
@@ -200,14 +200,25 @@ def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  #
         kinds[0, i], kinds[1, i], kinds[2, i] = kind_lo, kind_hi, sacrificed
 
 
-@entry(types.float64(_read, _read, _read, types.Array(types.int64, 1, "A", readonly=True), types.float64[::1]))
-def _admit(qd, lower, upper, sacrificed, admitted):  # type: ignore[no-untyped-def]
+@entry(types.void(*[_read] * 6, types.float64, types.float64, _bounds, _kinds))
+def _box(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds):  # type: ignore[no-untyped-def]
+    box_into(q, qd, lower, upper, v_max, a_max, dt, return_speed, bounds, kinds)
+
+
+@inline
+def admit_into(qd, lower, upper, sacrificed, admitted):  # type: ignore[no-untyped-def]
+    """Clip qd to the box; returns by how much it was outside, at most; NaN if a limit gave way."""
     excess = 0.0
     for i in range(len(qd)):
         admitted[i] = min(max(qd[i], lower[i]), upper[i])
         excess += np.nan if sacrificed[i] else 0.0
         excess = max(abs(admitted[i] - qd[i]), excess) if excess == excess else excess
     return excess
+
+
+@entry(types.float64(_read, _read, _read, types.Array(types.int64, 1, "A", readonly=True), types.float64[::1]))
+def _admit(qd, lower, upper, sacrificed, admitted):  # type: ignore[no-untyped-def]
+    return admit_into(qd, lower, upper, sacrificed, admitted)
 
 
 @entry(types.void(*[_read] * 3, types.float64, _bounds, _kinds))

@@ -37,18 +37,30 @@ class Times(NamedTuple):
 
 
 def time_calls(
-    call: Callable[[int], Any], runs: int, warm_up: int = 200, progress: Callable[[int], None] | None = None
+    call: Callable[[int], Any],
+    runs: int,
+    warm_up: int = 200,
+    progress: Callable[[int], None] | None = None,
+    collector: str = "off",
 ) -> Times:
     """Time `call(k)` for k = 0 .. runs-1 one by one, after `warm_up` calls that do not count.
 
-    The garbage collector is off while timing, as a 250 Hz loop would have it. `progress` is told now and then how many
-    calls have been made since it was told last.
+    Args:
+        call: What is timed.
+        runs: How often.
+        warm_up: Calls before.
+        progress: Told now and then how many calls have been made since it was told last.
+        collector: The garbage collector while timing: "off", as a 250 Hz loop would have it; "on"; or "frozen", on, but
+            after `gc.freeze` it does not look at what was there before.
     """
     for k in range(warm_up):
         call(k)
     taken = np.empty(runs)
     gc.collect()
-    gc.disable()
+    if collector == "off":
+        gc.disable()
+    elif collector == "frozen":
+        gc.freeze()
     try:
         for k in range(runs):
             start = time.perf_counter()
@@ -58,6 +70,7 @@ def time_calls(
                 progress(_STRIDE)
     finally:
         gc.enable()
+        gc.unfreeze()
     return Times(runs, *(float(value) for value in np.percentile(taken, (50.0, 99.0, 99.9, 100.0))))
 
 
@@ -86,7 +99,14 @@ def time_sensing(runs: int, progress: Callable[[int], None] | None = None) -> Ti
     return time_calls(lambda k: sensing.update(state, wire, readings[k % 500]), runs, progress=progress)
 
 
-def time_ticks(law: Law, runs: int, progress: Callable[[int], None] | None = None, *, points: bool = False) -> Times:
+def time_ticks(
+    law: Law,
+    runs: int,
+    progress: Callable[[int], None] | None = None,
+    *,
+    points: bool = False,
+    collector: str = "off",
+) -> Times:
     """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through all regimes.
 
     The distances sweep slowly from 0.76 m to 0.32 m and back, so that every regime and transition occurs; the robot
@@ -95,26 +115,25 @@ def time_ticks(law: Law, runs: int, progress: Callable[[int], None] | None = Non
     Args:
         law: The law.
         runs: Number of ticks.
-        progress: Called after every tick.
+        progress: Called now and then.
         points: Give the detected points themselves: everything but what is done to raw sensor readings.
+        collector: As for `time_calls`.
     """
     robot = load_robot("irb140")
     target = FixedPose(robot.pose("tcp", robot.home))
     controller = SafetyController(robot, [PositionTask("tcp", target), OrientationTask("tcp", target)], law)
-    state = {"q": robot.home, "qd": np.zeros(6)}
-    count = len(controller.spots) if controller.spots is not None else 0
-    offsets = np.random.default_rng(1).uniform(-0.02, 0.02, count)
+    assert controller.spots is not None
+    offsets = np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))
     sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
-    home = robot.at(robot.home)
-    around = [controller.spots.points(home, d + offsets) for d in sweep] if controller.spots is not None else []
+    distances, home = [d + offsets for d in sweep], robot.at(robot.home)
+    given = [controller.spots.points(home, d) for d in distances] if points else distances
+    state = [np.array(robot.home), np.zeros(6)]
 
     def tick(k: int) -> None:
-        distances = sweep[k % len(sweep)] + offsets
-        detections = around[k % len(around)] if points else distances
-        reference = controller.step(state["q"], state["qd"], detections).reference
-        state["q"], state["qd"] = reference.q, reference.qd
+        reference = controller.step(state[0], state[1], given[k % 2500]).reference
+        state[:] = reference.q, reference.qd
 
-    return time_calls(tick, runs, progress=progress)
+    return time_calls(tick, runs, progress=progress, collector=collector)
 
 
 def machine() -> dict[str, str]:

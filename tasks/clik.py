@@ -94,6 +94,38 @@ def _turned(B: Array, a: int, P: Array) -> Vector:
     )
 
 
+@inline
+def pose_rows(
+    poses: Array, twists: Array, support: Array, body: int, placement: Array, rows: Index, gain: float, goal: Array,
+    twist: Array, J: Array, velocity: Array, error: Array,
+) -> None:  # fmt: skip
+    """Rows of e = (x_d - x, log(R_d Rᵀ)), of ẋ_d + K e and of the Jacobian, for a frame on a body."""
+    B, P = poses[body], placement
+    # the frame's place x and axes R in the world, by rows
+    x = place(B, P[0, 3], P[1, 3], P[2, 3])
+    r0, r1, r2 = _turned(B, 0, P), _turned(B, 1, P), _turned(B, 2, P)
+    d0, d1, d2 = _row3(goal, 0), _row3(goal, 1), _row3(goal, 2)
+    turn = rotation_vector(
+        (
+            (dot(d0, r0), dot(d0, r1), dot(d0, r2)),
+            (dot(d1, r0), dot(d1, r1), dot(d1, r2)),
+            (dot(d2, r0), dot(d2, r1), dot(d2, r2)),
+        )
+    )
+    e = (goal[0, 3] - x[0], goal[1, 3] - x[1], goal[2, 3] - x[2], turn[0], turn[1], turn[2])
+    for i in range(rows.shape[0]):
+        c = rows[i]
+        error[i] = e[c]
+        velocity[i] = twist[c] + gain * e[c]
+        a, b = (c + 1) % 3, (c + 2) % 3
+        for j in range(twists.shape[1]):
+            # linear rows: v + ω × x; angular rows: ω
+            if c < 3:
+                J[i, j] = support[j] * (twists[c, j] + twists[3 + a, j] * x[b] - twists[3 + b, j] * x[a])
+            else:
+                J[i, j] = support[j] * twists[c, j]
+
+
 _read, _vector, _matrix = readable(1), types.Array(types.float64, 1, "C", readonly=True), readable(2)
 
 
@@ -110,31 +142,5 @@ def _pose_clik(
     goal: Array, twist: Array, J: Array, result: Array,
 ) -> None:  # fmt: skip
     """Fill J (rows, n) and result (2, rows): velocity, error."""
-    n = supports.shape[1]
-    bodies, twists, _, _ = cut(memory, n, k)
-    B, P = bodies[body], placement
-    # the frame's place x and axes R in the world, by rows
-    x = place(B, P[0, 3], P[1, 3], P[2, 3])
-    r0, r1, r2 = _turned(B, 0, P), _turned(B, 1, P), _turned(B, 2, P)
-    d0, d1, d2 = _row3(goal, 0), _row3(goal, 1), _row3(goal, 2)
-    # e = (x_d - x, log(R_d Rᵀ))
-    turn = rotation_vector(
-        (
-            (dot(d0, r0), dot(d0, r1), dot(d0, r2)),
-            (dot(d1, r0), dot(d1, r1), dot(d1, r2)),
-            (dot(d2, r0), dot(d2, r1), dot(d2, r2)),
-        )
-    )
-    e = (goal[0, 3] - x[0], goal[1, 3] - x[1], goal[2, 3] - x[2], turn[0], turn[1], turn[2])
-    for i in range(rows.shape[0]):
-        c = rows[i]
-        result[1, i] = e[c]
-        result[0, i] = twist[c] + gain * e[c]  # ẋ = ẋ_d + K e
-        a, b = (c + 1) % 3, (c + 2) % 3
-        for j in range(n):
-            on = supports[body, j]
-            # linear rows: v + ω × x; angular rows: ω
-            if c < 3:
-                J[i, j] = on * (twists[c, j] + twists[3 + a, j] * x[b] - twists[3 + b, j] * x[a])
-            else:
-                J[i, j] = on * twists[c, j]
+    poses, twists, _, _ = cut(memory, supports.shape[1], k)
+    pose_rows(poses, twists, supports[body], body, placement, rows, gain, goal, twist, J, result[0], result[1])

@@ -62,6 +62,11 @@ class OrientationTask(PoseTask):
             return euler_zyx_rates(sample.pose[:3, :3]) @ sample.twist[3:] + self.gain * error
         return super().velocity(error, sample)
 
+    @property
+    def plain(self) -> bool:
+        """See `PoseTask.plain`."""
+        return type(self).clik is OrientationTask.clik and self.form == "rotation vector"
+
     def clik(self, state: RobotState, sample: Sample) -> Clik:
         """See `Task.clik`."""
         return Task.clik(self, state, sample) if self.form == "euler" else self.compiled_clik(state, sample)

@@ -125,6 +125,11 @@ class PoseTask(Task):
         """CLIK velocity ẋ_d + K e, (rows,)."""
         return sample.twist[self._rows] + self.gain * error
 
+    @property
+    def plain(self) -> bool:
+        """Whether the task is what compiled code takes it for: e = rows of (x_d - x, log(R_d Rᵀ)) of one frame."""
+        return type(self).clik is PoseTask.compiled_clik
+
     def compiled_clik(self, state: RobotState, sample: Sample) -> Clik:
         """`clik` in one compiled call, for e = rows of (x_d - x, log(R_d Rᵀ))."""
         quick = pose_clik(state, self.frame, self._numbers, self.gain, sample)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from threading import Timer
 from typing import Any
-from zlib import crc32
 
 import numba
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from qpsafe.danger.compiled import checksum
 from qpsafe.hqp import own_damping, own_hierarchy, own_level, own_linear, own_rules, own_state
 from qpsafe.hqp.own_hierarchy import HEADER, run
 from qpsafe.hqp.own_state import workspace
@@ -34,16 +33,8 @@ _SIGNATURE = types.void(
 )  # fmt: skip
 
 
-def _sources() -> int:
-    """Checksum of all the code that goes into the kernel."""
-    try:
-        files = (
-            Path(str(module.__file__))
-            for module in (own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
-        )
-        return crc32(b"".join(file.read_bytes() for file in files))
-    except OSError:  # installed without sources
-        return 0
+#: All the code that goes into the kernel.
+MODULES = (own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
 
 
 def _compile(key: int) -> Callable[..., None]:
@@ -68,7 +59,7 @@ def _compile(key: int) -> Callable[..., None]:
         notice.cancel()
 
 
-SOURCES = _sources()
+SOURCES = checksum(*MODULES)
 solve = _compile(SOURCES)
 _NO_WEIGHTS = np.empty(0)
 _memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}

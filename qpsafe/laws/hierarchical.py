@@ -6,7 +6,6 @@ import functools
 import math
 from collections.abc import Sequence
 from functools import partial
-from time import perf_counter
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,7 +21,6 @@ from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult
 
 Array = NDArray[np.float64]
-_FLOAT = np.dtype(np.float64)
 
 Projection = Literal["strict", "paper"]
 
@@ -61,48 +59,11 @@ class HierarchicalLaw:
         self.projection = projection
         self.solver = solver
         if solver in (None, "own"):
-            from qpsafe.hqp.own_regimes import solve_regimes  # compiles now if need be, not within the first tick
-
-            self._solve_regimes = solve_regimes
+            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
         self.damping = float(damping)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
-        result = self._solve_together(problem) if self.solver in (None, "own") else None
-        return result or self._solve_one_by_one(problem)
-
-    def _solve_together(self, problem: LawProblem) -> LawResult | None:
-        """All regimes in one compiled call, to the same bits; None where that is not possible."""
-        tasks, qd0, activations, lower, upper, soft = problem
-        n, above = len(qd0), (1.0, *activations)
-        weights = [a - b for a, b in zip(above, (*activations, 0.0), strict=True)]  # as regime_weights
-        if soft or lower is None or upper is None or not tasks or (self.projection == "paper" and any(weights[2:])):
-            return None
-        begin = perf_counter()
-        matrices, targets = zip(*tasks, strict=True)
-        A, b = np.concatenate(matrices), np.concatenate(targets)
-        counts = tuple(map(len, targets))
-        known = A.dtype is b.dtype is qd0.dtype is lower.dtype is upper.dtype is _FLOAT
-        if not known or A.shape[1:] != (n,) or b.ndim != 1 or counts != tuple(map(len, matrices)):
-            return None  # plain NumPy says what is wrong
-        if not (lower.shape == upper.shape == qd0.shape and len(weights) == len(tasks) + 1):
-            return None
-        qd, x, info = self._solve_regimes(A, b, counts, np.array(weights), qd0, lower, upper, self.damping)
-        regimes, status = [], "solved"
-        heads, share = info[:, :3].tolist(), (perf_counter() - begin) / max(sum(map(bool, weights)), 1)
-        for kept, weight in enumerate(weights):
-            if weight > 0.0:
-                code, turns, where = heads[kept]
-                packed = partial(_packed, problem, A, b, counts[:kept])
-                note = note_of(STATUS[code], where, packed()) if code > 1 else ""
-                solution = Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)
-                regimes.append((weight, solution))
-                if code and status == "solved":
-                    status = solution.status
-        return LawResult(qd, status, tuple(regimes))
-
-    def _solve_one_by_one(self, problem: LawProblem) -> LawResult:
-        """Regime by regime, by any solver."""
         qd = np.zeros(len(problem.qd0))
         status = "solved"
         regimes = []
@@ -129,14 +90,49 @@ class HierarchicalLaw:
         return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=self.damping)
 
 
-def _packed(problem: LawProblem, A: Array, b: Array, counts: tuple[int, ...]) -> Packed:
+def weights_of(activations: Sequence[float]) -> list[float]:
+    """`regime_weights` as a list: w_k = a_k - a_(k+1), a_0 = 1, a_(N+1) = 0."""
+    return [a - b for a, b in zip((1.0, *activations), (*activations, 0.0), strict=True)]
+
+
+def regimes_of(
+    qd: Array,
+    x: Array,
+    info: NDArray[np.int64],
+    weights: Sequence[float],
+    data: tuple[Array, Array, Array, Array, Array],
+    counts: Sequence[int],
+    taken: float,
+) -> LawResult:
+    """The law's answer from what [`solve_regimes`][qpsafe.hqp.own_regimes.solve_regimes] computed: the same bits.
+
+    Args:
+        qd: Blend (n,).
+        x: Answers of the regimes (tasks + 1, n).
+        info: What the solver says about them.
+        weights: Of the regimes; those without were not solved.
+        data: J and ẋ of all tasks, q̇0, lower and upper limits: the solutions explain themselves with it.
+        counts: Rows of each task.
+        taken: Time of the call [s].
+    """
+    regimes, status = [], "solved"
+    heads, share = info[:, :3].tolist(), taken / max(sum(map(bool, weights)), 1)
+    for kept, weight in enumerate(weights):
+        if weight > 0.0:
+            code, turns, where = heads[kept]
+            packed = partial(_packed, *data, counts[:kept])
+            note = note_of(STATUS[code], where, packed()) if code > 1 else ""
+            regimes.append((weight, Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)))
+            if code and status == "solved":
+                status = STATUS[code]
+    return LawResult(qd, status, tuple(regimes))
+
+
+def _packed(A: Array, b: Array, qd0: Array, lower: Array, upper: Array, counts: Sequence[int]) -> Packed:
     """The hierarchy of a regime as its solution wants it to explain itself."""
-    rows, n = sum(counts), len(problem.qd0)
-    low = np.concatenate((b[:rows], problem.qd0))
-    assert problem.lower is not None
-    assert problem.upper is not None
-    matrix = np.concatenate((A[:rows], _identity(n)))
-    return Packed(matrix, low, low, None, [*counts, n], problem.lower, problem.upper, False)
+    rows, n = sum(counts), len(qd0)
+    low = np.concatenate((b[:rows], qd0))
+    return Packed(np.concatenate((A[:rows], _identity(n))), low, low, None, [*counts, n], lower, upper, False)
 
 
 @functools.lru_cache(maxsize=32)

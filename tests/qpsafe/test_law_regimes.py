@@ -1,4 +1,6 @@
-"""All regimes in one compiled call have the bits of one `solve_hierarchy` each, and tell the same story."""
+"""Tasks, limits and law in one compiled call against the same one after the other: equal bits, and the same story."""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,18 +8,67 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.hqp.level import Level
-from qpsafe.laws.problem import LawProblem, TaskVelocity
+from qpsafe.resolve import Resolver, judged, resolve
+from qpsafe.tasks.trajectory import Sample
+
+goal = qpsafe.FixedPose(np.eye(4))
+TASKS: dict[str, list[Any]] = {
+    "position and orientation": [qpsafe.PositionTask("tcp", goal), qpsafe.OrientationTask("tcp", goal)],
+    "one": [qpsafe.FrameTask("flange", goal, 2.0)],
+    "three": [
+        qpsafe.PositionTask("tcp", goal),
+        qpsafe.FrameTask("dh3", goal, rows=(1, 2)),
+        qpsafe.OrientationTask("tcp", goal),
+    ],
+}
 
 
-def same(law: qpsafe.HierarchicalLaw, problem: LawProblem) -> None:
-    together, one_by_one = law._solve_together(problem), law._solve_one_by_one(problem)
-    assert together is not None
-    assert np.array_equal(together.qd, one_by_one.qd)
-    assert together.status == one_by_one.status
-    assert len(together.regimes) == len(one_by_one.regimes)
-    for (weight, a), (other, b) in zip(together.regimes, one_by_one.regimes, strict=True):
-        assert weight == other
+def draw(rng: np.random.Generator, robot: Any, tasks: list[Any], spread: float) -> tuple[Any, ...]:
+    """A commanded state, samples near and far from it, q̇0 and activations."""
+    q = rng.uniform(robot.lower - 0.05, robot.upper + 0.05)
+    if rng.random() < 0.3:
+        q[4] = 0.0  # singular
+    state = robot.at(q)
+    samples = []
+    for task in tasks:
+        pose = robot.pose(task.frame, q + spread * rng.normal(size=robot.nq))
+        samples.append(Sample(pose, spread * rng.normal(size=6)))
+    qd = rng.uniform(-1.0, 1.0, robot.nq) * robot.max_velocity * rng.choice([0.1, 1.1])
+    activations = np.sort(rng.choice([0.0, 0.4, 1.0, rng.random()], len(tasks)))[::-1]
+    return state, qd, tuple(samples), rng.normal(size=robot.nq), tuple(activations.tolist())
+
+
+@pytest.mark.parametrize("key", TASKS)
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 2**32 - 1), st.sampled_from([0.01, 1.0]), st.sampled_from([0.0, 0.02]), st.sampled_from([0, 0, 1, 2])
+)
+def test_one_call_is_all_of_them(irb140: Any, key: str, seed: int, spread: float, damping: float, bad: int) -> None:
+    rng, tasks, robot = np.random.default_rng(seed), TASKS[key], irb140
+    law = qpsafe.HierarchicalLaw(damping=damping)
+    limits = qpsafe.JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration)
+    assert Resolver.fits(tasks, law, limits)
+    state, qd, samples, qd0, activations = draw(rng, robot, tasks, spread)
+    if bad == 1:
+        samples[0].pose[0, 3] = np.nan
+    if bad == 2:
+        qd0[2] = np.inf
+    one = Resolver(robot, tasks, law, limits)(state, qd, samples, qd0, activations)
+    assert one is not None
+    box = limits.box(state.q, qd)
+    other = resolve(state, tasks, samples, qd0, activations, law, box, (), limits.dt)
+
+    for a, b in zip(one.box, other.box, strict=True):
+        assert np.array_equal(a, b)
+    for a, b in zip(one.errors, other.errors, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.array_equal(one.command, other.command)
+    assert np.array_equal(one.result.qd, other.result.qd)
+    np.testing.assert_array_equal(one.excess, other.excess)
+    assert judged(one, robot.joint_names) == judged(other, robot.joint_names)
+    assert one.result.status == other.result.status
+    for (weight, a), (same, b) in zip(one.result.regimes, other.result.regimes, strict=True):
+        assert weight == same
         assert np.array_equal(a.qd, b.qd)
         assert (a.status, a.iterations, a.note, a.solver) == (b.status, b.iterations, b.note, b.solver)
         assert (a.binding, a.pressed_by) == (b.binding, b.pressed_by)
@@ -25,41 +76,33 @@ def same(law: qpsafe.HierarchicalLaw, problem: LawProblem) -> None:
         assert str(a).splitlines()[:-1] == str(b).splitlines()[:-1]
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.02]), st.sampled_from([None, np.nan, np.inf]))
-def test_bits_and_story_are_the_same(seed: int, damping: float, bad: float | None) -> None:
-    rng = np.random.default_rng(seed)
-    n, count = int(rng.integers(1, 9)), int(rng.integers(1, 4))
-    tasks = []
-    for _ in range(count):
-        rows = int(rng.integers(1, 5))
-        J = rng.normal(size=(rows, n))
-        if rng.random() < 0.3:
-            J[-1] = J[0]
-        tasks.append(TaskVelocity(J, rng.normal(size=rows)))
-    activations = np.sort(rng.choice([0.0, 0.4, 1.0, rng.random()], count))[::-1]
-    limit = rng.uniform(0.0, 1.0, n) * rng.choice([0.3, 10.0])
-    lower, upper = -limit, limit
-    qd0 = rng.normal(size=n)
-    if bad is not None:
-        (tasks[0].velocity, tasks[-1].jacobian[0], qd0, lower)[rng.integers(4)][0] = bad
-    law = qpsafe.HierarchicalLaw(damping=damping)
-    same(law, LawProblem(tuple(tasks), qd0, tuple(activations.tolist()), lower, upper))
+class Slow(qpsafe.PositionTask):
+    """Redefines a method."""
+
+    def velocity(self, error: np.ndarray, sample: Any) -> np.ndarray:
+        return 0.5 * super().velocity(error, sample)
 
 
-def test_what_is_not_plain_is_left_to_the_general_way() -> None:
-    law, J = qpsafe.HierarchicalLaw(), np.eye(3)[:2]
-    plain = LawProblem((TaskVelocity(J, np.ones(2)),), np.zeros(3), (1.0,), -np.ones(3), np.ones(3))
-    same(law, plain)
-    row = Level(np.ones((1, 3)), -np.inf, 0.5)
-    others = [
-        plain._replace(lower=None, upper=None),
-        plain._replace(soft=(row,)),
-        plain._replace(tasks=(TaskVelocity(J.astype(np.float32), np.ones(2)),)),
-        plain._replace(tasks=(TaskVelocity(J.tolist(), [1.0, 1.0]),)),  # type: ignore[arg-type]
-    ]
-    for problem in others:
-        assert np.isfinite(law.solve(problem).qd).all()
-    wrong = plain._replace(tasks=(TaskVelocity(J, np.ones(3)), TaskVelocity(J, np.ones(1))), activations=(1.0, 1.0))
-    with pytest.raises(qpsafe.ConfigurationError):
-        law.solve(wrong)
+def test_what_is_not_built_in_goes_one_after_the_other(irb140: Any, run: Any) -> None:
+    tasks, law = TASKS["one"], qpsafe.HierarchicalLaw()
+    bounds = irb140.lower, irb140.upper, irb140.max_velocity, irb140.max_acceleration
+    limits = qpsafe.JointLimits(*bounds)
+    here = qpsafe.FixedPose(irb140.pose("tcp", irb140.home))
+    for other in (
+        ([Slow("tcp", here)], law, limits),
+        ([qpsafe.OrientationTask("tcp", here, form="euler")], law, limits),
+        ([qpsafe.PostureTask(irb140.home)], law, limits),
+        (tasks, qpsafe.WeightedLaw(), limits),
+        (tasks, qpsafe.HierarchicalLaw(solver="daqp"), limits),
+        (TASKS["three"], qpsafe.HierarchicalLaw("paper"), limits),
+        (tasks, law, None),
+        (tasks, law, qpsafe.JointLimits(*bounds, max_jerk=np.full(6, 500.0))),
+    ):
+        assert not Resolver.fits(*other)
+    # and in the middle of a run, parts may be exchanged
+    loop = run()
+    loop.step()
+    assert loop.controller._quick is not None
+    loop.controller.law = qpsafe.NullspaceLaw()
+    assert loop.step().law.regimes == ()
+    assert loop.controller._quick is None

@@ -1,0 +1,77 @@
+"""The compiled half of `qpsafe.resolve`: tasks on poses, joint limits and all regimes of the law in one call."""
+
+from __future__ import annotations
+
+from numba import types
+
+from qpsafe import limits as limits_module
+from qpsafe.checks import ABSURD_STEP
+from qpsafe.danger import compiled
+from qpsafe.danger.compiled import Array, entry, inline, readable
+from qpsafe.hqp import own_regimes
+from qpsafe.hqp.own_regimes import solve_regimes
+from qpsafe.hqp.own_solver import MODULES
+from qpsafe.limits import admit_into, box_into
+from qpsafe.robot import kinematics
+from qpsafe.robot.kinematics import Index, cut
+from qpsafe.tasks import clik
+from qpsafe.tasks.clik import pose_rows
+
+
+def parts(numbers: Array, n: int, rows: int, kinds: int) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    """Results of `resolve_quickly`: J (rows, n), ẋ, e (rows,), regimes (tasks + 1, n), box (2, n), blend, command."""
+    a = rows * n
+    b = a + 2 * rows
+    c = b + kinds * n
+    return (
+        numbers[:a].reshape(rows, n),
+        numbers[a : a + rows],
+        numbers[a + rows : b],
+        numbers[b:c].reshape(kinds, n),
+        numbers[c : c + 2 * n].reshape(2, n),
+        numbers[c + 2 * n : c + 3 * n],
+        numbers[c + 3 * n :],
+    )
+
+
+_cut_numbers = inline(parts)
+_one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
+_any, _ints, _int_rows = readable(1), types.Array(types.int64, 1, "C", readonly=True), types.int64[:, ::1]
+
+
+@entry(
+    types.float64(
+        _one, _any, _one, _two, types.int64, _ints, _three, _ints, _two, types.float64, types.float64,
+        _one, _three, _two, _one, _one, types.float64,
+        types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
+        _ints, types.float64[::1], _int_rows, _int_rows,
+    ),
+    compiled, kinematics, clik, limits_module, own_regimes, *MODULES,
+)  # fmt: skip
+def resolve_quickly(
+    q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
+    limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
+    weights: Array, damping: float, floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index,
+    ends: Index, numbers: Array, info: Index, codes: Index,
+) -> float:  # fmt: skip
+    """Fill numbers (see `parts`), info of every regime, codes of the box; returns the excess, -1 if q̇ is absurd."""
+    A, b, e, x, bounds, blend, command = _cut_numbers(numbers, q.shape[0], rows.shape[0], weights.shape[0])
+    poses, axes, _, _ = cut(memory, q.shape[0], k)
+    # CLIK: ẋ = ẋ_d + K e
+    for t in range(bodies.shape[0]):
+        first, stop = (ends[t - 1] if t > 0 else 0), ends[t]
+        pose_rows(
+            poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
+            twists[t], A[first:stop], b[first:stop], e[first:stop],
+        )  # fmt: skip
+    # limits -> box; regimes of the law within it, blended
+    box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
+    solve_regimes(
+        floats, integers, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
+        blend,
+    )  # fmt: skip
+    # checked: finite, sane, inside the box
+    for i in range(blend.shape[0]):
+        if not abs(blend[i]) * dt < ABSURD_STEP:  # true for NaN
+            return -1.0
+    return admit_into(blend, bounds[0], bounds[1], codes[2], command)
