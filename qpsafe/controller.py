@@ -110,7 +110,7 @@ class SafetyController:
         self._seq = -1
         self._active = False
         self._q = self.robot.home.copy()
-        self._qd, self._qdd = np.zeros(self.robot.nq), np.zeros(self.robot.nq)
+        self._qd = self._qd_before = np.zeros(self.robot.nq)
 
     def reseed(self) -> None:
         """Something else has moved or stopped the robot: the next valid measurement sets the commanded configuration.
@@ -120,7 +120,7 @@ class SafetyController:
         self.evasion.reset()
         self.recovery.set_tasks(self.tasks, self.activation.suspend_above, restart=False)
         self._active = False
-        self._qd, self._qdd = np.zeros(self.robot.nq), np.zeros(self.robot.nq)
+        self._qd = self._qd_before = np.zeros(self.robot.nq)
 
     def acknowledge(self) -> None:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
@@ -204,7 +204,8 @@ class SafetyController:
         q = as_joint_position(q, self.robot)
         qd = as_joint_velocity(qd, self.robot)
         if not self._active:  # the commanded configuration starts where the robot is
-            self._q, self._qd, self._active = np.array(q), np.zeros(self.robot.nq), True
+            self._q, self._active = np.array(q), True
+            self._qd = self._qd_before = np.zeros(self.robot.nq)
 
         # spot distances -> detected points (7), without known obstacles and the robot itself, lost ones held
         measured = self.robot.at(q)
@@ -226,7 +227,8 @@ class SafetyController:
         quick = None if self.barrier else self._resolver()
         resolved = None if quick is None else quick(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
-            box = self.limits.box(self._q, self._qd, self._qdd) if self.limits else None
+            qdd = (self._qd - self._qd_before) / self.dt
+            box = self.limits.box(self._q, self._qd, qdd) if self.limits else None
             barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
             soft = (barrier,) if barrier else ()
             resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
@@ -298,8 +300,7 @@ class SafetyController:
         )
 
     def _advance(self, command: NDArray[np.float64]) -> None:
-        self._qdd = (command - self._qd) / self.dt
-        self._qd = command
+        self._qd_before, self._qd = self._qd, command
         self._q = self._q + command * self.dt
 
     def _reference(self) -> JointReference:

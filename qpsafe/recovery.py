@@ -105,6 +105,10 @@ class Recovery:
         self._next_phase(cdf_n, state, activations)
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
             return tuple([task.trajectory.sample(self.path_time) for task in self.tasks])
+        if self.phase == SUSPENDED:
+            samples = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
+            self._last = [(state, sample) for sample in samples]  # only the last tick's will be of interest
+            return tuple(samples)
         return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
 
     @property
@@ -160,9 +164,6 @@ class Recovery:
         if self.phase != FOLLOWING or self._rate < 1.0:
             sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
         if not self._pending[k]:
-            return sample
-        if self.phase == SUSPENDED:
-            self._last[k] = state, sample  # where the task is now: only the last tick's will be of interest
             return sample
         value = task.value(state)
         if not sample.finite:  # never into an offset, which remembers

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from qpsafe.checks import checked_velocity
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import layout_for
-from qpsafe.laws.hierarchical import HierarchicalLaw, regimes_of, weights_of
+from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
 from qpsafe.resolve_kernel import parts, resolve_quickly
@@ -170,7 +170,7 @@ class Resolver:
         (n, rows, kinds), weights = self._sizes, weights_of(activations)
         numbers, info = np.zeros(self._floats), np.zeros((kinds, HEADER + 2 * n + rows), dtype=np.int64)
         codes = np.empty((3, n), dtype=np.int64)
-        excess = resolve_quickly(
+        excess, worst = resolve_quickly(
             state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, np.array(weights), self._law.damping,
             *self._layout, numbers, info, codes,
         )  # fmt: skip
@@ -179,6 +179,7 @@ class Resolver:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {blend}")
         lower, upper = bounds
         data, ends = (A, b, qd0, lower, upper), self._ends
-        result = regimes_of(blend, x, info, weights, data, self._counts, perf_counter() - begin)
+        taken = perf_counter() - begin
+        result = BlendResult(blend, x, info, weights, data, self._counts, taken, worst == 0.0)
         errors = tuple([e[ends[k] : ends[k + 1]] for k in range(kinds - 1)])
         return Resolved(command, excess, Box(lower, upper, *codes), result, errors)

@@ -40,7 +40,7 @@ _any, _ints, _int_rows = readable(1), types.Array(types.int64, 1, "C", readonly=
 
 
 @entry(
-    types.float64(
+    types.UniTuple(types.float64, 2)(
         _one, _any, _one, _two, types.int64, _ints, _three, _ints, _two, types.float64, types.float64,
         _one, _three, _two, _one, _one, types.float64,
         types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
@@ -53,8 +53,8 @@ def resolve_quickly(
     limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
     weights: Array, damping: float, floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index,
     ends: Index, numbers: Array, info: Index, codes: Index,
-) -> float:  # fmt: skip
-    """Fill numbers (see `parts`), info of every regime, codes of the box; returns the excess, -1 if q̇ is absurd."""
+) -> tuple[float, float]:  # fmt: skip
+    """Fill numbers (see `parts`), info per regime, codes of the box; returns excess, -1 if q̇ is absurd, worst code."""
     A, b, e, x, bounds, blend, command = _cut_numbers(numbers, q.shape[0], rows.shape[0], weights.shape[0])
     poses, axes, _, _ = cut(memory, q.shape[0], k)
     # CLIK: ẋ = ẋ_d + K e
@@ -73,5 +73,8 @@ def resolve_quickly(
     # checked: finite, sane, inside the box
     for i in range(blend.shape[0]):
         if not abs(blend[i]) * dt < ABSURD_STEP:  # true for NaN
-            return -1.0
-    return admit_into(blend, bounds[0], bounds[1], codes[2], command)
+            return -1.0, 0.0
+    worst = 0
+    for kept in range(info.shape[0]):
+        worst = max(worst, info[kept, 0])
+    return admit_into(blend, bounds[0], bounds[1], codes[2], command), float(worst)

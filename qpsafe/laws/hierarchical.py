@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,7 +15,7 @@ from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.packing import Packed
-from qpsafe.hqp.solution import Solution
+from qpsafe.hqp.solution import SOLVED, Solution
 from qpsafe.hqp.solve import STATUS, note_of, solve_hierarchy
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult
@@ -92,19 +92,18 @@ class HierarchicalLaw:
 
 def weights_of(activations: Sequence[float]) -> list[float]:
     """`regime_weights` as a list: w_k = a_k - a_(k+1), a_0 = 1, a_(N+1) = 0."""
-    return [a - b for a, b in zip((1.0, *activations), (*activations, 0.0), strict=True)]
+    weights, above = [], 1.0
+    for a in activations:
+        weights.append(above - a)
+        above = a
+    weights.append(above)
+    return weights
 
 
-def regimes_of(
-    qd: Array,
-    x: Array,
-    info: NDArray[np.int64],
-    weights: Sequence[float],
-    data: tuple[Array, Array, Array, Array, Array],
-    counts: Sequence[int],
-    taken: float,
-) -> LawResult:
+class BlendResult(LawResult):
     """The law's answer from what [`solve_regimes`][qpsafe.hqp.own_regimes.solve_regimes] computed: the same bits.
+
+    The regimes' solutions are made when they are looked at.
 
     Args:
         qd: Blend (n,).
@@ -114,18 +113,40 @@ def regimes_of(
         data: J and ẋ of all tasks, q̇0, lower and upper limits: the solutions explain themselves with it.
         counts: Rows of each task.
         taken: Time of the call [s].
+        solved: Whether all regimes were.
     """
-    regimes, status = [], "solved"
-    heads, share = info[:, :3].tolist(), taken / max(sum(map(bool, weights)), 1)
-    for kept, weight in enumerate(weights):
-        if weight > 0.0:
-            code, turns, where = heads[kept]
-            packed = partial(_packed, *data, counts[:kept])
-            note = note_of(STATUS[code], where, packed()) if code > 1 else ""
-            regimes.append((weight, Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)))
-            if code and status == "solved":
-                status = STATUS[code]
-    return LawResult(qd, status, tuple(regimes))
+
+    def __init__(
+        self,
+        qd: Array,
+        x: Array,
+        info: NDArray[np.int64],
+        weights: Sequence[float],
+        data: tuple[Array, Array, Array, Array, Array],
+        counts: Sequence[int],
+        taken: float,
+        solved: bool,
+    ) -> None:
+        self.__dict__.update(qd=qd, status=SOLVED, _given=(x, info, weights, data, counts, taken))
+        if not solved:
+            bad = next(solution.status for _, solution in self.regimes if solution.status != SOLVED)
+            self.__dict__["status"] = bad
+
+    @cached_property
+    def regimes(self) -> tuple[tuple[float, Solution], ...]:  # type: ignore[override]
+        """(weight, solution) of every regime that was solved."""
+        data: tuple[Array, Array, Array, Array, Array]
+        x, info, weights, data, counts, taken = self.__dict__["_given"]
+        regimes = []
+        heads, share = info[:, :3].tolist(), taken / max(sum(map(bool, weights)), 1)
+        for kept, weight in enumerate(weights):
+            if weight > 0.0:
+                code, turns, where = heads[kept]
+                packed = partial(_packed, *data, counts[:kept])
+                note = note_of(STATUS[code], where, packed()) if code > 1 else ""
+                solution = Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)
+                regimes.append((weight, solution))
+        return tuple(regimes)
 
 
 def _packed(A: Array, b: Array, qd0: Array, lower: Array, upper: Array, counts: Sequence[int]) -> Packed:

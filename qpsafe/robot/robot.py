@@ -14,6 +14,8 @@ from qpsafe.robot.spec import RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
 
+_FLOAT = np.dtype(np.float64)
+
 
 class Robot:
     """Kinematics and limits of one robot; SI units, world frame = the model's world.
@@ -106,7 +108,9 @@ class Robot:
         Raises:
             ConfigurationError: q has the wrong shape.
         """
-        return RobotState(self, _read_only(self.joint_vector(q, "q")))
+        own = self.joint_vector(q, "q").copy()
+        own.flags.writeable = False
+        return RobotState(self, own)
 
     def pose(self, frame: str, q: ArrayLike) -> NDArray[np.float64]:
         """Pose of a frame in the world at q, (4, 4) [m]. Raises ConfigurationError on an unknown frame."""
@@ -152,6 +156,8 @@ class Robot:
         Raises:
             ConfigurationError: The shape is another one, or these are no numbers.
         """
+        if type(values) is np.ndarray and values.dtype is _FLOAT and values.shape == (self.nq,):  # the usual case
+            return values
         try:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):

@@ -77,7 +77,7 @@ class RobotState:
         starts, stops = robot.wire_indices
         parts = np.empty((4, len(starts), 3))
         wire_of(self.memory, robot.ends, robot.joint_vector(qd, "qd"), starts, stops, parts)
-        return Wire(*parts)
+        return tuple.__new__(Wire, parts)  # without a detour through Python
 
     def wire_jacobians(self) -> Array:
         """Linear Jacobians of the frames that end segments of the wire, (k, 3, n), as in `robot.wire_end_frames`.
