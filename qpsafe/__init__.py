@@ -34,6 +34,7 @@ _PUBLIC = {
     "RecoveryRules": "qpsafe.recovery",
     "RelativeFrameTask": "qpsafe.tasks.frame",
     "RobotFileError": "qpsafe.errors",
+    "RobotWarning": "qpsafe.errors",
     "SafetyController": "qpsafe.controller",
     "SensingRules": "qpsafe.sensing.rules",
     "SpotArray": "qpsafe.sensing.spots",
@@ -49,6 +50,7 @@ _PUBLIC = {
     "load_program": "qpsafe.tasks.program_file",
     "load_robot": "qpsafe.robot.loader",
     "load_spots": "qpsafe.sensing.spots",
+    "robot_activation": "qpsafe.danger.thresholds",
     "nullspace_velocity": "qpsafe.laws.nullspace",
     "solve_hierarchy": "qpsafe.hqp.solve",
 }
@@ -62,9 +64,11 @@ if TYPE_CHECKING:
     from qpsafe.danger.barrier import DangerBarrier as DangerBarrier
     from qpsafe.danger.evasion import Evasion as Evasion
     from qpsafe.danger.field import DangerField as DangerField
+    from qpsafe.danger.thresholds import robot_activation as robot_activation
     from qpsafe.errors import ConfigurationError as ConfigurationError
     from qpsafe.errors import QpsafeError as QpsafeError
     from qpsafe.errors import RobotFileError as RobotFileError
+    from qpsafe.errors import RobotWarning as RobotWarning
     from qpsafe.hqp.level import Level as Level
     from qpsafe.hqp.solve import solve_hierarchy as solve_hierarchy
     from qpsafe.laws.hierarchical import HierarchicalLaw as HierarchicalLaw

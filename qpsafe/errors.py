@@ -34,5 +34,9 @@ class RobotFileError(ConfigurationError):
     """A robot folder, its `robot.toml`, `spots.toml` or model file is wrong."""
 
 
+class RobotWarning(UserWarning):
+    """Something in a robot's files is missing or doubtful; says what was assumed instead. Also in `robot.notes`."""
+
+
 class MissingExtraError(QpsafeError, ImportError):
     """An optional dependency is needed for what was asked; the message names the extra to install."""

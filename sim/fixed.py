@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import RobotFileError
 from qpsafe.laws.problem import Law
 from qpsafe.sim.choreography import Choreography
 from qpsafe.sim.distance import board_distance, person_distance
 from qpsafe.sim.log import Recorder, RunLog
 from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.plant import Plant
+from qpsafe.sim.robot_stage import robot_stage
 from qpsafe.sim.scene import Scene, build_scene
 from qpsafe.tasks.rotation import euler_zyx, log3
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
@@ -44,7 +46,7 @@ class FixedExperiment:
         sensor: ``ideal`` distances, or those of ``sharp`` sensors.
         rules: What counts as danger, and what sick sensors do; None for the controller's default.
         cap: Cap on the danger field (`DangerBarrier`), None for none.
-        choreography: How the person moves; `seed` varies it.
+        choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
         recovery: How the robot returns to its path; None for the controller's default.
         story: Who does what instead of the choreography; `seed` varies it too.
     """
@@ -58,14 +60,21 @@ class FixedExperiment:
     sensor: str = "ideal"
     rules: SensingRules | None = None
     cap: float | None = None
-    choreography: Choreography = field(default_factory=Choreography)
+    choreography: Choreography = None  # type: ignore[assignment]  # set below: it depends on the robot
     recovery: RecoveryRules | None = None
     story: Story | None = None
+
+    def __post_init__(self) -> None:
+        if self.robot.spots_path is None:
+            raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
+        if self.choreography is None:
+            self.choreography = robot_stage(self.robot).choreography
 
     @cached_property
     def scene(self) -> Scene:
         """The world, built on first use."""
-        return build_scene(self.robot, people=self.walk.persons)
+        floor = self.choreography.person.floor if self.story is None else self.story.floor
+        return build_scene(self.robot, pedestal=-floor, people=self.walk.persons)
 
     @cached_property
     def walk(self) -> Choreography | Story:
@@ -74,8 +83,14 @@ class FixedExperiment:
 
     @cached_property
     def reference(self) -> Trajectory:
-        """What the tool is to follow: in this experiment, to stay where it is."""
-        return FixedPose(self.robot.pose("tcp", self.robot.home))
+        """What the first tool is to follow: in this experiment, to stay where it is."""
+        return FixedPose(self.robot.pose(self.robot.tool_frames[0], self.robot.home))
+
+    @cached_property
+    def references(self) -> dict[str, Trajectory]:
+        """What every tool is to follow: the others stay where they are."""
+        first, *others = self.robot.tool_frames
+        return {first: self.reference} | {name: FixedPose(self.robot.pose(name, self.robot.home)) for name in others}
 
     @property
     def start(self) -> NDArray[np.float64]:
@@ -92,19 +107,21 @@ class FixedExperiment:
             SimulationFailedError: MuJoCo reported bad values.
         """
         robot, scene, loop = self.robot, self.scene, FixedLoop(self)
-        controller, plant, target = loop.controller, loop.plant, loop.target
+        controller, plant = loop.controller, loop.plant
         assert controller.spots is not None
         recorder = Recorder(controller.dt, controller.spots.names)
         for _ in range(round(self.duration / controller.dt)):
             tick, q, qd, distances, state = loop.step()
-            pose, goal = state.pose("tcp"), target.sample(tick.path_time).pose
+            goals = {name: target.sample(tick.path_time).pose for name, target in self.references.items()}
+            commanded = robot.at(tick.reference.q)
+            measured = [pose_error(state.pose(name), goal) for name, goal in goals.items()]
             recorder.add(
                 tick,
                 q,
                 qd,
                 distances,
-                pose_error(pose, goal),
-                euler_error(robot.pose("tcp", tick.reference.q), goal),
+                (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
+                np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
             )
             if observer is not None:

@@ -37,7 +37,8 @@ class RunLog:
         regime, phase, status: (N,) words.
         q_ref, qd_ref: Commanded joint position and velocity (N, n) [rad, rad/s].
         q, qd: Measured ones, at the start of the tick (N, n).
-        orientation_error, position_error: Commanded pose against the reference (N, 3) [rad, m].
+        orientation_error, position_error: Commanded pose against the reference (N, 3) [rad, m]; of a robot with several
+            tools one after the other (N, 3 tools), as in the next three.
         measured_orientation_error, measured_position_error: The plant's pose against it (N, 3) [rad, m].
         euler_error: The source's orientation error, difference of ZYX Euler angles (N, 3) [rad].
         board_distance, person_distance: Smallest true distance robot-board, robot-person (N,) [m].
@@ -175,15 +176,17 @@ class Recorder:
         """Record one tick.
 
         Args:
-            tick: From the controller; two tasks, position first.
+            tick: From the controller; a position task for each tool, then an orientation task for each.
             q, qd: Measured joints (n,).
             distances: Readings of the spots (k,).
-            measured: Position (3,) and orientation error (3,) of the measured pose.
-            euler: Euler-angle error of the commanded pose (3,).
+            measured: Position (3 tools,) and orientation error (3 tools,) of the measured pose.
+            euler: Euler-angle error of the commanded pose (3 tools,).
             gaps: Smallest true distances robot-board, robot-person [m].
         """
         self._messages.extend((len(self._rows), message) for message in tick.messages)
-        position, orientation = tick.errors if tick.errors else (np.full(3, np.nan), np.full(3, np.nan))
+        tools = len(tick.activations) // 2
+        errors = tick.errors or (np.full(3, np.nan),) * 2 * tools
+        position, orientation = np.concatenate(errors[:tools]), np.concatenate(errors[tools:])
         self._rows.append(
             (
                 tick.reference.time,

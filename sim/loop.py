@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
 from qpsafe.danger.barrier import DangerBarrier
+from qpsafe.danger.thresholds import robot_activation
 from qpsafe.robot.state import RobotState
 from qpsafe.sim.known import known_obstacles
 from qpsafe.sim.plant import Plant
 from qpsafe.sim.sensor import make_sensor
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
+from qpsafe.tasks.task import Task
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
@@ -49,12 +51,15 @@ class FixedLoop:
         robot, scene = experiment.robot, experiment.scene
         self.scene, self.walk = scene, experiment.walk
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)
-        self.target = experiment.reference
-        tasks = [PositionTask("tcp", self.target), OrientationTask("tcp", self.target)]
+        self.targets = experiment.references
+        # one hierarchy: where all tools are, over how they are turned
+        tasks: list[Task] = [PositionTask(name, target) for name, target in self.targets.items()]
+        tasks += [OrientationTask(name, target) for name, target in self.targets.items()]
         self.controller = SafetyController(
             robot,
             tasks,
             experiment.law,
+            activation=robot_activation(robot, len(self.targets), len(self.targets)),
             limits="robot" if experiment.limits else None,
             sensing=experiment.rules,
             known=known_obstacles(scene),
@@ -88,5 +93,5 @@ class FixedLoop:
 
     def copy(self) -> FixedLoop:
         """The run as it is now, to go on in another way; robot, scene, law and rays are shared."""
-        shared = (self.scene, self.scene.robot, self.walk, self.controller.law, self.target)
+        shared = (self.scene, self.scene.robot, self.walk, self.controller.law, *self.targets.values())
         return copy.deepcopy(self, {id(item): item for item in shared})

@@ -29,13 +29,14 @@ STYLE = {
 }
 
 
-def figure_11(log: RunLog, path: Path, title: str = "") -> None:
+def figure_11(log: RunLog, path: Path, title: str = "", activation: Activation | None = None) -> None:
     """Distances, CDF_n with both thresholds, orientation and position error; medium shaded yellow, high red.
 
     Args:
         log: The run.
         path: PNG or PDF to write.
         title: Above the figure.
+        activation: For the thresholds shown; the source's by default.
     """
     import matplotlib
 
@@ -44,7 +45,7 @@ def figure_11(log: RunLog, path: Path, title: str = "") -> None:
         for axis in axes:
             shade(axis, log)
         _distances(axes[0], log)
-        _danger(axes[1], log)
+        _danger(axes[1], log, activation or Activation())
         _components(axes[2], log, np.rad2deg(log.euler_error), ("φ", "θ", "ψ"), "(c) orientation\nerror [deg]")
         _components(axes[3], log, 1e3 * log.position_error, ("x", "y", "z"), "(d) position\nerror [mm]")
         axes[3].set_xlabel("time [s]")
@@ -79,8 +80,8 @@ def _distances(axis: Axes, log: RunLog) -> None:
     _legend(axis, fontsize=6)
 
 
-def _danger(axis: Axes, log: RunLog) -> None:
-    high, low = Activation().thresholds
+def _danger(axis: Axes, log: RunLog, activation: Activation) -> None:
+    high, low = activation.levels
     axis.plot(log.time, log.cdf_n, color="#0b5fa5", label="CDF$_n$")
     axis.axhline(high.start, color="#c0392b", linestyle="--", label="Δ(1-ε)")
     axis.axhline(low.start, color="#2a8c3c", linestyle="-.", label="Δ$_f$(1-ε$_f$)")
@@ -92,6 +93,9 @@ def _danger(axis: Axes, log: RunLog) -> None:
 
 
 def _components(axis: Axes, log: RunLog, values: NDArray[np.float64], names: tuple[str, ...], label: str) -> None:
+    if values.shape[1] > 3:  # several tools: the norm of each
+        values = np.linalg.norm(values.reshape(len(values), -1, 3), axis=2)
+        names = tuple(f"tool {i + 1}" for i in range(values.shape[1]))
     for i, name in enumerate(names):
         colour, style = _COMPONENT[i]
         axis.plot(log.time, np.abs(values[:, i]), color=colour, linestyle=style, linewidth=1.1, label=name)

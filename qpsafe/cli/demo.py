@@ -38,6 +38,9 @@ app = typer.Typer(help="Run the source's experiments in MuJoCo.", no_args_is_hel
 
 @app.command()
 def fixed(
+    robot: Annotated[
+        str, typer.Option(help="A bundled robot, a robot folder with spots, or 'all': one table over all bundled ones.")
+    ] = "irb140",
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[
         ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
@@ -63,41 +66,62 @@ def fixed(
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """First experiment: keep a fixed tool pose while a person with a card board comes from three sides."""
+    from qpsafe.cli.demo_robots import every_robot
+
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.encounter import encounter
     from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.robot_stage import robot_stage
     from qpsafe.sim.story_file import load_story
 
-    told = None if story is None else load_story(story)
-    experiment = FixedExperiment(
-        load_robot("irb140"),
-        make_law(law, projection, solver),
-        seed=seed,
-        lag=lag,
-        duration=duration or (60.0 if told is None else told.duration),
-        story=told,
-        sensor=sensor.value,
-        cap=cap,
-    )
+    def make(name: str) -> FixedExperiment:
+        chosen = load_robot(name)
+        told = None if story is None else load_story(story, floor=-robot_stage(chosen).pedestal)
+        return FixedExperiment(
+            chosen,
+            make_law(law, projection, solver),
+            seed=seed,
+            lag=lag,
+            duration=duration or (60.0 if told is None else told.duration),
+            story=told,
+            sensor=sensor.value,
+            cap=cap,
+        )
+
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
+    if robot == "all":
+
+        def run(experiment: FixedExperiment, folder: Path) -> Report:
+            return _once(experiment, title, folder, video, view, screen)[0]
+
+        kept = every_robot(make, run, out, json, screen)
+    else:
+        experiment = make(robot)
+        report, log, files = _once(experiment, title, out, video, view, screen)
+        kept, near = report.kept, encounter(log, experiment.robot)
+        if json:
+            print_json(report.to_dict() | {"encounter": near.to_dict()})
+        else:
+            show(report, title, screen)
+            if story is not None:
+                screen.print(near.sentence(), highlight=False)
+            screen.print(f"written to {out}: {', '.join(files)}", highlight=False)
+    if not kept:
+        raise typer.Exit(1)
+
+
+def _once(
+    experiment: FixedExperiment, title: str, out: Path, video: bool, view: bool, screen: Console
+) -> tuple[Report, RunLog, list[str]]:
+    """One run with its files."""
     out.mkdir(parents=True, exist_ok=True)
     files = ["signals.csv", "figure.png", "distance.png", "report.json", "run.npz"]
     log, filmed = _run(experiment, out, video, view, screen)
     if filmed:
         files.append("video.mp4")
-    report = _write(experiment, log, title, out)
-    near = encounter(log, experiment.robot)
-    if json:
-        print_json(report.to_dict() | {"encounter": near.to_dict()})
-    else:
-        show(report, title, screen)
-        if told is not None:
-            screen.print(near.sentence(), highlight=False)
-        screen.print(f"written to {out}: {', '.join(files)}", highlight=False)
-    if not report.kept:
-        raise typer.Exit(1)
+    return _write(experiment, log, title, out), log, files
 
 
 def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen: Console) -> tuple[RunLog, bool]:
@@ -105,7 +129,7 @@ def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen
     from qpsafe.sim.run_file import StateRecorder, write_run
     from qpsafe.sim.settings import settings_of
 
-    label, states = f"{experiment.duration:g} s, 250 Hz", StateRecorder()
+    label, states = f"{experiment.robot.name}, {experiment.duration:g} s, 250 Hz", StateRecorder()
     with (
         progress_bar(screen) as progress,
         observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, filmed),
@@ -127,7 +151,7 @@ def observed(
     states: StateRecorder | None = None,
 ) -> Iterator[tuple[Observer, bool]]:
     """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not."""
-    from qpsafe.danger.activation import Activation
+    from qpsafe.danger.thresholds import robot_activation
     from qpsafe.errors import MissingExtraError
     from qpsafe.sensing.spots import load_spots
     from qpsafe.sim.film import Film, Viewer
@@ -135,6 +159,7 @@ def observed(
 
     spots = load_spots(experiment.robot)
     assert spots is not None
+    activation = robot_activation(experiment.robot)
     with ExitStack() as stack:
         observers: list[Any] = [] if states is None else [states.observe]
         filmed = False
@@ -142,7 +167,7 @@ def observed(
             available, reason = gl_available()
             try:
                 if available:
-                    film = Film(path, experiment.scene, spots, Activation())
+                    film = Film(path, experiment.scene, spots, activation)
                     observers.append(stack.enter_context(film).observe)
                     filmed = True
             except MissingExtraError as error:
@@ -150,7 +175,7 @@ def observed(
             if not available:
                 screen.print(f"no video: {reason}", style="yellow", highlight=False)
         if view:
-            viewer = Viewer(experiment.scene, spots, Activation())
+            viewer = Viewer(experiment.scene, spots, activation)
             stack.callback(viewer.close)
             observers.append(viewer.observe)
         task = progress.add_task(label, total=round(experiment.duration / 0.004))
@@ -165,6 +190,7 @@ def observed(
 
 def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> Report:
     """Write csv, figures and report, each whole or not at all."""
+    from qpsafe.danger.thresholds import robot_activation
     from qpsafe.sim.plots import distance_figure, figure_11
     from qpsafe.sim.report import summarise
     from qpsafe.sim.story_plots import encounter_figure
@@ -172,7 +198,8 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
     without = experiment.board_distance_without_controller()
     report = summarise(log, without, experiment.windows(), experiment.robot)
     log.write_csv(out / "signals.csv")
-    figure_11(log, out / "figure.png", f"First experiment, {title}")
+    activation = robot_activation(experiment.robot)
+    figure_11(log, out / "figure.png", f"First experiment, {experiment.robot.name}, {title}", activation)
     if experiment.story is None:
         distance_figure(log, without, out / "distance.png")
     else:

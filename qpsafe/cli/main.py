@@ -32,7 +32,7 @@ app = typer.Typer(
 )
 app.add_typer(demo.app, name="demo")
 app.command("compare")(compare.compare)
-app.command("robots")(robots.robots)
+app.add_typer(robots.app, name="robots")
 app.command("bench")(bench.bench)
 app.command("calibrate")(calibrate.calibrate)
 app.command("story")(story.story)

@@ -1,36 +1,67 @@
-"""`qpsafe robots`: list the bundled robots, or inspect one."""
+"""`qpsafe robots`: list the robots, inspect one, or write a first robot.toml for a model of your own."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from qpsafe.cli.common import console, print_json
 
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
 
+
+class _NameOrCommand(TyperGroup):
+    """`qpsafe robots NAME` means `qpsafe robots inspect NAME`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        words = [word for word in args if not word.startswith("-")]
+        if words and words[0] not in self.commands:
+            args = ["inspect", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(cls=_NameOrCommand)
+
+
+@app.callback(invoke_without_command=True)
 def robots(
-    name: Annotated[str | None, typer.Argument(help="A bundled name, or a path to a robot folder.")] = None,
+    context: typer.Context,
     json: Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")] = False,
 ) -> None:
-    """List the bundled robots, or show joints, frames, wire and spots of one (which checks all its files)."""
+    """List the bundled robots; `robots NAME` inspects one, `robots add FILE` begins one of your own."""
+    if context.invoked_subcommand is not None:
+        return
+    from qpsafe.robot.loader import bundled_robots, load_robot
+
+    names = bundled_robots()
+    if json:
+        print_json(names)
+        return
+    for item in names:
+        console(json).print(f"{item}: {load_robot(item).title}", highlight=False)
+
+
+@app.command()
+def inspect(
+    name: Annotated[str, typer.Argument(help="A bundled name, a robot folder, an MJCF or URDF file, PACKAGE:MODEL.")],
+    json: Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")] = False,
+) -> None:
+    """Show joints, frames, wire and spots of a robot (which checks all its files), and what is doubtful in them."""
     import numpy as np
     from rich.table import Table
 
-    from qpsafe.robot.loader import bundled_robots, load_robot
+    from qpsafe.danger.thresholds import robot_thresholds
     from qpsafe.sensing.spots import load_spots
 
     screen = console(json)
-    if name is None:
-        names = bundled_robots()
-        if json:
-            print_json(names)
-        else:
-            for item in names:
-                screen.print(f"{item}: {load_robot(item).title}", highlight=False)
-        return
-    robot = load_robot(name)
+    robot = _load(name)
     spots = load_spots(robot)
+    high, low = robot_thresholds(robot)
     if json:
         print_json(
             {
@@ -49,6 +80,9 @@ def robots(
                 "frames": robot.frame_names,
                 "wire": robot.wire_frames,
                 "spots": spots.names if spots else [],
+                "tools": robot.tool_frames,
+                "danger": {"delta": high.delta, "delta_f": low.delta},
+                "notes": robot.notes,
             }
         )
         return
@@ -64,3 +98,53 @@ def robots(
     if spots is not None:
         ranges = f"range {spots.range_min.min()} to {spots.range_max.max()} m"
         screen.print(f"spots:  {len(spots)}, {ranges}: {', '.join(spots.names)}")
+    screen.print("tools:  " + ", ".join(robot.tool_frames), highlight=False)
+    screen.print(f"danger: Δ = {high.delta:g}, Δ_f = {low.delta:g}", highlight=False)
+    for note in robot.notes:
+        screen.print(f"note:   {note}", style="yellow", highlight=False)
+
+
+@app.command()
+def add(
+    file: Annotated[str, typer.Argument(help="An MJCF or URDF file, or PACKAGE:MODEL.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the robot.toml; by default the model file's.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a robot.toml that is there.")] = False,
+) -> None:
+    """Write a first robot.toml for a model file: limits, wire and frames as found, with notes on what was assumed."""
+    from qpsafe.errors import ConfigurationError
+    from qpsafe.robot.loader import find_robot, load_robot
+    from qpsafe.robot.starting_file import starting_robot_toml
+
+    if find_robot(file).suffix == ".toml":
+        raise ConfigurationError("robots add", "FILE", file, "an MJCF or URDF file: this robot has its robot.toml")
+    robot = _load(file)
+    folder = robot.folder if out is None else out
+    path, part = folder / "robot.toml", folder / ".robot.toml.part"
+    if path.exists() and not force:
+        raise ConfigurationError("robots add", "robot.toml", str(path), "no such file yet; --force writes over it")
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        part.write_text(starting_robot_toml(robot, folder), encoding="utf-8")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            again = load_robot(robot.model_path, part)  # what does not load is not written
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    screen = console(False)
+    screen.print(f"written: {path}", highlight=False)
+    for note in robot.notes:
+        screen.print(f"note: {note}", style="yellow", highlight=False)
+    screen.print(
+        f"{again.name}: {again.nq} joints, {len(again.wire_frames)} links, see `qpsafe robots {folder}`",
+        highlight=False,
+    )
+
+
+def _load(name: str) -> Robot:
+    """The robot; its notes are printed, not warned of."""
+    from qpsafe.robot.loader import load_robot
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return load_robot(name)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qpsafe.errors import RobotFileError
+from qpsafe.errors import RobotFileError, RobotWarning
+from qpsafe.robot.defaults import spec_from_model
 from qpsafe.robot.dh import dh_frames
-from qpsafe.robot.model_file import read_model, spec_from_model
+from qpsafe.robot.model_file import ModelFile, read_model
+from qpsafe.robot.package_model import find_package_model, is_package_model
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
 from qpsafe.robot.spec import DHChain, RobotSpec, Tool
@@ -26,6 +28,7 @@ def bundled_robots() -> list[str]:
 
 def load_robot(
     name_or_path: str | Path,
+    toml: str | Path | None = None,
     *,
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
@@ -36,16 +39,19 @@ def load_robot(
     """Load a robot.
 
     Args:
-        name_or_path: A bundled name (see [`bundled_robots`][]), the path of a robot folder (with `robot.toml`), or an
-            MJCF or URDF file, from which limits, frames and a wire through the joint origins are taken as they are.
+        name_or_path: A bundled name (see [`bundled_robots`][]); the path of a robot folder (with `robot.toml`); an MJCF
+            or URDF file, from which limits, frames and a wire along the joint tree are taken; or a model of another
+            package, ``"robot_descriptions:panda_description"`` or ``"example_robot_data:ur5"``.
+        toml: A `robot.toml` that describes this model file, wherever it is.
         lower: Lower position limits for a bare model file, one number or (n,) [rad].
         upper: Upper position limits for a bare model file, one number or (n,) [rad].
-        max_velocity: Speed limits for a bare model file (MJCF has none), one number or (n,) [rad/s].
-        max_acceleration: Acceleration limits for a bare model file, one number or (n,) [rad/s^2]; 10 if not given.
+        max_velocity: Speed limits for a bare model file, one number or (n,) [rad/s]; 1 where neither is stated (MJCF).
+        max_acceleration: Acceleration limits for a bare model file, one number or (n,) [rad/s^2]; what reaches full
+            speed in 0.25 s if not given.
         home: Home pose for a bare model file, (n,) [rad]; zero, moved inside the limits, if not given.
 
     Returns:
-        The robot.
+        The robot; what is missing or doubtful in its files stands in `robot.notes` and is warned of (`RobotWarning`).
 
     Raises:
         RobotFileError: There is no such robot, or one of its files is wrong; names file, key and value.
@@ -58,22 +64,29 @@ def load_robot(
         "home": home,
     }
     given = {key: value for key, value in overrides.items() if value is not None}
-    path = _find(name_or_path)
-    if path.suffix == ".toml":
+    path = find_robot(name_or_path)
+    described = path if path.suffix == ".toml" else None if toml is None else Path(toml)
+    if described is not None:
         for key, value in given.items():
-            raise RobotFileError("load_robot", key, value, f"nothing: {path} states the limits; edit it instead")
-        return _load_folder(path)
-    model = read_model(path)
-    return Robot(spec_from_model(path, model, given), model)
+            raise RobotFileError("load_robot", key, value, f"nothing: {described} states the limits; edit it instead")
+        robot = _load_described(described, None if described is path else path)
+    else:
+        file = read_model(path)
+        robot = Robot(spec_from_model(path, file, given), file.model)
+    if robot.notes:
+        warnings.warn(f"{robot.model_path.name}: " + "; ".join(robot.notes), RobotWarning, stacklevel=2)
+    return robot
 
 
 def _bundled_folder() -> Path:
     return Path(str(files("qpsafe.robots")))
 
 
-def _find(name_or_path: str | Path) -> Path:
-    """The robot.toml or model file that is meant."""
+def find_robot(name_or_path: str | Path) -> Path:
+    """The robot.toml or model file that is meant; raises RobotFileError where there is none."""
     bundled = bundled_robots()
+    if is_package_model(str(name_or_path)):
+        return find_package_model(str(name_or_path))
     if str(name_or_path) in bundled:
         return _bundled_folder() / str(name_or_path) / "robot.toml"
     path = Path(name_or_path)
@@ -81,23 +94,28 @@ def _find(name_or_path: str | Path) -> Path:
         return path / "robot.toml"
     if path.is_file():
         return path
-    expected = f"a bundled robot ({', '.join(bundled)}), or the path of a robot folder, an MJCF or a URDF file"
+    expected = (
+        f"a bundled robot ({', '.join(bundled)}), the path of a robot folder, an MJCF or a URDF file, or PACKAGE:MODEL"
+    )
     raise RobotFileError("load_robot", "name_or_path", str(name_or_path), expected)
 
 
-def _load_folder(path: Path) -> Robot:
+def _load_described(path: Path, model_path: Path | None) -> Robot:
+    """The robot that the robot.toml at `path` describes, with its own model file or the given one."""
     file = read_robot_file(path)
-    model_path = path.parent / file.model
-    if not model_path.is_file():
-        raise RobotFileError(path, "model", file.model, "a file in the same folder")
-    model = read_model(model_path)
-    robot = Robot(_to_spec(path, file, model), model)
+    if model_path is None:
+        model_path = path.parent / file.model
+        if not model_path.is_file():
+            raise RobotFileError(path, "model", file.model, "a file in the same folder")
+    model_file = read_model(model_path, trusted=_bundled_folder() in path.parents)
+    robot = Robot(_to_spec(path, file, model_path, model_file), model_file.model)
     _check_kinematics(path, robot)
     return robot
 
 
-def _to_spec(path: Path, file: RobotFile, model: Any) -> RobotSpec:
+def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFile) -> RobotSpec:
     """The file in SI units and in the order of the model's joints; checks joints and frames against the model."""
+    model = model_file.model
     names = list(model.names)[1:]  # 0 is pinocchio's universe
     for name in names:
         if name not in file.joints:
@@ -133,7 +151,8 @@ def _to_spec(path: Path, file: RobotFile, model: Any) -> RobotSpec:
         title=file.title,
         manufacturer=file.manufacturer,
         folder=path.parent,
-        model_path=path.parent / file.model,
+        model_path=model_path,
+        notes=model_file.notes,
         spots_path=spots if spots is not None and spots.is_file() else None,
         joint_names=tuple(names),
         lower=rad * np.array([joint.lower for joint in joints]),

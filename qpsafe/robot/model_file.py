@@ -1,109 +1,150 @@
-"""Reading MJCF and URDF files with pinocchio, and describing a robot from such a file alone."""
+"""Reading MJCF and URDF files with pinocchio: one robot of revolute joints, and what had to be assumed for it."""
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ElementTree
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import RobotFileError
-from qpsafe.robot.spec import RobotSpec
+from qpsafe.robot.mjcf_check import check_mjcf, check_same_kinematics
+from qpsafe.robot.urdf_check import check_urdf, package_folders
 
-DEFAULT_MAX_ACCELERATION = 10.0  # rad/s^2; neither MJCF nor URDF can state one
+ENDLESS = 2.0 * math.pi  # rad either way: what a joint without end gets as its range
 
 
-def read_model(path: Path) -> Any:
-    """The pinocchio model of an MJCF or URDF file with one-degree-of-freedom revolute joints.
+class ModelFile(NamedTuple):
+    """A model file as it was understood.
 
-    Raises:
-        RobotFileError: The file is neither, cannot be parsed, or has other kinds of joints.
+    Attributes:
+        model: pinocchio's model, revolute joints only.
+        notes: What is missing or doubtful in the file, and what was assumed, in words.
+        held: Names of the other joints, which are held in place.
     """
-    try:
-        tag = ElementTree.parse(path).getroot().tag
-    except (OSError, ElementTree.ParseError) as error:
-        raise RobotFileError(path, "file", path.name, f"an MJCF or URDF file ({error})") from error
-    builders = {"mujoco": pin.buildModelFromMJCF, "robot": pin.buildModelFromUrdf}
-    if tag not in builders:
-        raise RobotFileError(path, "root element", tag, "<mujoco> (MJCF) or <robot> (URDF)")
-    try:
-        model = builders[tag](str(path))
-    except (ValueError, RuntimeError) as error:
-        raise RobotFileError(path, "file", path.name, f"a model that pinocchio can read ({error})") from error
-    if model.nq == 0:
-        raise RobotFileError(path, "joints", 0, "at least one joint")
-    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
-        if not joint.shortname().startswith("JointModelR") or joint.nq != 1:
-            raise RobotFileError(path, name, joint.shortname(), "a revolute joint with one number for its position")
-    return model
+
+    model: Any
+    notes: tuple[str, ...]
+    held: tuple[str, ...]
 
 
-def spec_from_model(path: Path, model: Any, given: dict[str, ArrayLike]) -> RobotSpec:
-    """Describe a robot from its model file alone.
+def read_model(path: Path, trusted: bool = False) -> ModelFile:
+    """Read an MJCF or URDF file.
 
-    Frames are all frames of the model. The wire runs from the base through the joints' origins to the model's last
-    frame. What the file does not state must be `given`, except accelerations (10 rad/s^2) and the home pose (zero,
-    moved inside the limits).
+    Joints that are not revolute, and those that mimic others, are held where the file has them; joints that turn
+    without end get a range of two turns. Both are said in the notes.
 
     Args:
-        path: The model file.
-        model: Its pinocchio model.
-        given: Overrides: lower, upper, max_velocity, max_acceleration, home; each one number or (n,).
+        path: The file.
+        trusted: Whether to do without MuJoCo's checks of an MJCF: those of the bundled robots are made by the tests.
 
     Raises:
-        RobotFileError: A limit is neither in the file nor given, or makes no sense.
+        RobotFileError: The file is neither, cannot be parsed, or something in it is wrong; names the place.
     """
-    names = tuple(model.names)[1:]
-    from_file = {
-        "lower": model.lowerPositionLimit,
-        "upper": model.upperPositionLimit,
-        "max_velocity": model.velocityLimit,
-        "max_acceleration": DEFAULT_MAX_ACCELERATION,
-    }
-    values = {key: _per_joint(path, key, given.get(key, default), model.nq) for key, default in from_file.items()}
-    for key, array in values.items():
-        for name, value in zip(names, array, strict=True):
-            if not (np.isfinite(value) and abs(value) < 1e6):  # URDF readers write huge numbers for "no limit"
-                expected = f"a finite limit; the file states none: pass {key}=... to load_robot"
-                raise RobotFileError(path, f"{name}.{key}", float(value), expected)
-            if key.startswith("max_") and not value > 0:
-                raise RobotFileError(path, f"{name}.{key}", float(value), "a number above zero")
-    for name, low, high in zip(names, values["lower"], values["upper"], strict=True):
-        if not low < high:
-            raise RobotFileError(path, f"{name}.lower", float(low), f"less than upper = {float(high)!r} rad")
-    home = np.clip(np.zeros(model.nq), values["lower"], values["upper"])
-    home = _per_joint(path, "home", given.get("home", home), model.nq)
-    for name, value, low, high in zip(names, home, values["lower"], values["upper"], strict=True):
-        if not low <= value <= high:
-            raise RobotFileError(path, f"{name}.home", float(value), f"within {low:g} to {high:g} rad")
-
-    frames = [frame.name for frame in model.frames]
-    chain = ["universe", *names]
-    if frames[-1] != chain[-1]:
-        chain.append(frames[-1])
-    return RobotSpec(
-        name=model.name or path.stem,
-        title=model.name or path.stem,
-        folder=path.parent,
-        model_path=path,
-        joint_names=names,
-        home=home,
-        frames={name: name for name in frames},
-        wire_frames=tuple(pairwise(chain)),
-        lower=values["lower"],
-        upper=values["upper"],
-        max_velocity=values["max_velocity"],
-        max_acceleration=values["max_acceleration"],
-    )
-
-
-def _per_joint(path: Path, key: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
-    """One number for every joint, or one for each, as an array (n,)."""
     try:
-        return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)))
-    except (TypeError, ValueError):
-        raise RobotFileError(path, key, value, f"one number or {n} numbers") from None
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError, ValueError) as error:
+        raise RobotFileError(path, "file", path.name, f"an MJCF or URDF file ({error})") from error
+    if root.tag not in ("mujoco", "robot"):
+        raise RobotFileError(path, "root element", root.tag, "<mujoco> (MJCF) or <robot> (URDF)")
+    if root.tag == "robot":
+        notes = check_urdf(path, root)
+    else:
+        notes = [] if trusted else check_mjcf(path, root)
+    endless = _bound_endless(root) if root.tag == "robot" else []
+    mimics = [joint.get("name", "") for joint in root.findall("joint") if joint.find("mimic") is not None]
+    full = _build(path, root)
+    if root.tag == "mujoco" and not trusted:
+        check_same_kinematics(path, full)
+    endless += _bound_unlimited(full)
+    if endless:
+        notes.append(f"joints that turn without end get a range of ±360°: {', '.join(endless)}")
+    names, joints = list(full.names)[1:], list(full.joints)[1:]
+    other = {
+        name: joint.shortname()
+        for name, joint in zip(names, joints, strict=True)
+        if not (joint.shortname().startswith("JointModelR") and joint.nq == 1)
+    }
+    if other:
+        listed = ", ".join(f"{name} ({kind.removeprefix('JointModel')})" for name, kind in other.items())
+        notes.append(f"joints that are not revolute are held in place: {listed}")
+    held = [name for name in names if name in other or name in mimics]
+    if len(held) == len(names):
+        found = listed if other else 0
+        raise RobotFileError(path, "joints", found, "at least one revolute joint with one number for its position")
+    model = pin.buildReducedModel(full, [full.getJointId(name) for name in held], pin.neutral(full)) if held else full
+    return ModelFile(model, tuple(notes), tuple(held))
+
+
+def collision_geometry(path: Path, model: Any) -> Any:
+    """pinocchio's collision geometry for a model that `read_model` made of a file.
+
+    Raises:
+        ValueError, RuntimeError: pinocchio cannot read it.
+    """
+    root = ElementTree.parse(path).getroot()
+    if root.tag == "robot":
+        _bound_endless(root)
+    full = _build(path, root)
+    if root.tag == "robot":
+        text = ElementTree.tostring(root, encoding="unicode")
+        geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION, package_dirs=_mesh_folders(path))
+    else:
+        geometry = pin.buildGeomFromMJCF(full, str(path), pin.GeometryType.COLLISION)
+    kept = set(model.names)
+    held = [full.getJointId(name) for name in list(full.names)[1:] if name not in kept]
+    if held:
+        _, geometry = pin.buildReducedModel(full, geometry, held, pin.neutral(full))
+    return geometry
+
+
+def _build(path: Path, root: Any) -> Any:
+    try:
+        if root.tag == "robot":
+            return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
+        return pin.buildModelFromMJCF(str(path))
+    except (ValueError, RuntimeError, IndexError) as error:
+        raise RobotFileError(path, "file", path.name, f"a model that pinocchio can read ({error})") from error
+
+
+def _mesh_folders(path: Path) -> list[str]:
+    return [str(path.parent), *package_folders(path)]
+
+
+def _bound_endless(root: Any) -> list[str]:
+    """Make continuous joints of a URDF revolute ones of two turns; their names.
+
+    What a <limit> leaves out or calls infinite becomes 0, "not stated": the reader would refuse the whole file.
+    """
+    found = []
+    for limit in root.iterfind("joint/limit"):
+        for key in ("velocity", "effort"):
+            if not math.isfinite(float(limit.get(key, "inf"))):
+                limit.set(key, "0")
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ElementTree.SubElement(joint, "limit", velocity="0", effort="0")
+            limit.set("lower", repr(-ENDLESS))
+            limit.set("upper", repr(ENDLESS))
+            found.append(joint.get("name", ""))
+    return found
+
+
+def _bound_unlimited(model: Any) -> list[str]:
+    """Give hinges without a range (MJCF) one of two turns; their names."""
+    lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
+    found = []
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        i = joint.idx_q
+        if joint.nq == 1 and not (abs(lower[i]) < 1e6 and abs(upper[i]) < 1e6):
+            lower[i], upper[i] = -ENDLESS, ENDLESS
+            if joint.shortname().startswith("JointModelR"):
+                found.append(name)
+    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    return found

@@ -44,7 +44,7 @@ class Robot:
         memory: Floats in the kinematics of one configuration.
         tools: The mounted tools, one an arm.
         tool: The first of them, or None.
-        tool_frames: Frames at the tips of the tools; the last frame of the wire where no tool is named.
+        tool_frames: Frames at the tips of the tools; the ends of the wire where no tool is named.
         chains: Published Denavit-Hartenberg tables, one an arm.
         dh: The table (theta, d, a, alpha) of a robot with one, (n, 4), or None.
         dh_frames: Names of the frames of that table.
@@ -71,7 +71,7 @@ class Robot:
         self.home = _read_only(spec.home)
         self.tools: tuple[Tool, ...] = spec.tools
         self.tool: Tool | None = spec.tools[0] if spec.tools else None
-        self.tool_frames = tuple(tool.frame for tool in spec.tools) or (spec.wire_frames[-1][1],)
+        self.tool_frames = tuple(tool.frame for tool in spec.tools) or _tips(spec.wire_frames)
         self.chains = spec.chains
         self.dh = _read_only(spec.chains[0].table) if len(spec.chains) == 1 else None
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
@@ -168,6 +168,12 @@ class Robot:
 
     def _no_frame(self, frame: object) -> ConfigurationError:
         return ConfigurationError(f"robot {self.name}", "frame", frame, "one of " + ", ".join(self.frame_names))
+
+
+def _tips(wire: tuple[tuple[str, str], ...]) -> tuple[str, ...]:
+    """Frames at which links end and none begins."""
+    starts = {start for start, _ in wire}
+    return tuple(dict.fromkeys(end for _, end in wire if end not in starts))
 
 
 def _read_only(values: ArrayLike) -> NDArray[np.float64]:

@@ -41,12 +41,11 @@ def body_hull_set(robot: Robot) -> HullSet:
 
 
 def _load(robot: Robot) -> tuple[BodyHull, ...]:
-    import pinocchio as pin
+    from qpsafe.robot.model_file import collision_geometry
 
     path = robot.model_path
-    build = pin.buildGeomFromUrdf if path.suffix.lower() == ".urdf" else pin.buildGeomFromMJCF
     try:
-        geometry = build(robot.model, str(path), pin.GeometryType.COLLISION)
+        geometry = collision_geometry(path, robot.model)
     except (ValueError, RuntimeError) as error:
         raise RobotFileError(path, "collision geometry", path.name, f"one that pinocchio can read ({error})") from error
     hulls = []

@@ -43,11 +43,13 @@ def test_demo_writes_report_figures_and_signals(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
     assert report["kept"] is True
+    assert report.pop("encounter")["contact"] is None
     assert report == json.loads((tmp_path / "new" / "report.json").read_text())
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
         "distance.png",
         "figure.png",
         "report.json",
+        "run.npz",
         "signals.csv",
     ]
 
@@ -130,3 +132,41 @@ def test_bench_writes_its_figures(tmp_path: Path) -> None:
     for times in content["results"].values():
         assert 0.0 < times["median"] <= times["p99"] <= times["p999"] <= times["maximum"]
     assert content["machine"]["processor"]
+
+
+def test_robots_add_writes_a_file_that_loads_and_never_over_another(tmp_path: Path) -> None:
+    import shutil
+
+    from qpsafe.robot.loader import load_robot
+
+    model = tmp_path / "arm.xml"
+    shutil.copy(load_robot("iiwa14").model_path, model)
+    result = run(app, ["robots", "add", str(model)])
+    assert result.exit_code == 0, result.output
+    assert "1 rad/s is taken" in " ".join(result.stdout.split())
+    assert load_robot(tmp_path).nq == 7
+    path = tmp_path / "robot.toml"
+    path.write_text(path.read_text().replace('name = "iiwa14"', 'name = "mine"'))
+    result = run(app, ["robots", "add", str(model)])
+    assert result.exit_code != 0
+    assert "--force" in str(result.exception)
+    assert load_robot(tmp_path).name == "mine"
+    assert run(app, ["robots", "add", str(model), "--force"]).exit_code == 0
+    assert load_robot(tmp_path).name == "iiwa14"
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["arm.xml", "robot.toml"]
+
+
+def test_robots_add_refuses_what_has_its_file(tmp_path: Path) -> None:
+    result = run(app, ["robots", "add", "irb140", "--out", str(tmp_path)])
+    assert result.exit_code != 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_inspecting_a_bare_model_says_what_was_assumed() -> None:
+    from qpsafe.robot.loader import load_robot
+
+    result = run(app, ["robots", str(load_robot("irb140").model_path)])
+    assert result.exit_code == 0
+    assert "note:" in result.stdout
+    shown = json.loads(run(app, ["robots", str(load_robot("irb140").model_path), "--json"]).stdout)
+    assert any("speed" in note for note in shown["notes"])

@@ -59,21 +59,6 @@ def test_braking_again_after_going_on_takes_its_time_again() -> None:
             assert np.allclose(made.qd, speed * (1 - k / 13.0), rtol=1e-12)
 
 
-def test_a_joint_near_its_limit_does_not_wait_for_the_slowest_to_brake() -> None:
-    """In proportion to the fast joint, the other one would run through its limit."""
-    wide = JointLimits([-9.0, -1.0], [9.0, 1.0], V_MAX, A_MAX, DT)
-    made = Shaper(wide, ramp_in=0.004, ramp_out=0.05, catch_up=0.5)
-    made.seed(np.zeros(N))
-    while made.q[1] < 0.93:
-        qd = np.minimum(made.qd + A_MAX * DT, V_MAX)
-        made.follow(made.q + qd * DT, qd)
-    assert np.allclose(made.qd, [3.0, 0.9], atol=0.05)
-    in_proportion = made.q[1] + made.qd[1] * 0.5 * made.qd[0] / A_MAX[0]
-    assert in_proportion > 1.05
-    while not made.brake():
-        assert made.q[1] <= 1.0 + 1e-12
-
-
 def test_braking_ends_at_rest_and_stays() -> None:
     made = shaper()
     for _ in range(100):

@@ -25,6 +25,7 @@ def test_what_the_files_state_is_what_the_rule_gives(name: str) -> None:
         assert stated.epsilon == source.epsilon
 
 
+@pytest.mark.filterwarnings("ignore::qpsafe.errors.RobotWarning")
 @pytest.mark.parametrize("name", bundled_robots())
 def test_a_bare_model_gets_its_thresholds_by_the_rule(name: str) -> None:
     """The same robot without its robot.toml: another wire, so other numbers, but always a valid activation."""

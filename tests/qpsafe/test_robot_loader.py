@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qpsafe.errors import RobotFileError
+from qpsafe.errors import RobotFileError, RobotWarning
 from qpsafe.robot.loader import bundled_robots, load_robot
+
+pytestmark = pytest.mark.filterwarnings("ignore::qpsafe.errors.RobotWarning")
 
 IRB140 = load_robot("irb140")
 
@@ -61,9 +63,11 @@ def test_a_folder_s_limits_are_not_overridden_silently() -> None:
         load_robot("irb140", max_velocity=1.0)
 
 
-def test_a_bare_mjcf_needs_speeds_and_says_so() -> None:
-    with pytest.raises(RobotFileError, match=r"joint_1\.max_velocity.*pass max_velocity="):
-        load_robot(IRB140.model_path)
+def test_a_bare_mjcf_gets_a_slow_speed_and_says_so() -> None:
+    with pytest.warns(RobotWarning, match="no speed limit in the file, 1 rad/s is taken: joint_1, "):
+        robot = load_robot(IRB140.model_path)
+    np.testing.assert_array_equal(robot.max_velocity, 1.0)
+    assert any("joint_6" in note for note in robot.notes)
 
 
 def test_a_bare_mjcf_has_the_same_kinematics_as_its_folder() -> None:
@@ -83,7 +87,7 @@ def test_a_urdf_against_plane_trigonometry(tmp_path: Path) -> None:
     assert robot.joint_names == ("shoulder", "elbow")
     np.testing.assert_array_equal(robot.lower, [-1, 0.5])
     np.testing.assert_array_equal(robot.max_velocity, [3, 3])
-    np.testing.assert_array_equal(robot.max_acceleration, 10.0)
+    np.testing.assert_array_equal(robot.max_acceleration, 12.0)  # full speed in 0.25 s
     np.testing.assert_array_equal(robot.home, [0, 0.5])  # zero, moved inside the limits
     a, b = 0.3, 0.9
     tip = [0.5 * np.cos(a) + 0.25 * np.cos(a + b), 0.5 * np.sin(a) + 0.25 * np.sin(a + b), 0.0]
@@ -113,12 +117,6 @@ def test_wrong_overrides_are_named(tmp_path: Path, keyword: str, value: object, 
     assert caught.value.key == key
 
 
-@pytest.mark.parametrize("kind", ["prismatic", "continuous"])
-def test_joints_that_cannot_be_handled_are_named(tmp_path: Path, kind: str) -> None:
-    with pytest.raises(RobotFileError, match=r"shoulder.*revolute"):
-        load_robot(urdf(tmp_path, kind=kind))
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -137,3 +135,44 @@ def test_files_that_are_no_robot_are_errors(tmp_path: Path, text: str, expected:
         load_robot(path)
     assert caught.value.where == str(path)
     assert expected in caught.value.expected
+
+
+def test_a_toml_elsewhere_describes_a_model_file(tmp_path: Path) -> None:
+    """The same robot, its robot.toml apart from its model."""
+    path = tmp_path / "mine.toml"
+    path.write_text((IRB140.folder / "robot.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    robot = load_robot(IRB140.model_path, path)
+    assert robot.model_path == IRB140.model_path
+    for name in ("lower", "upper", "max_velocity", "max_acceleration", "home", "dh"):
+        np.testing.assert_array_equal(getattr(robot, name), getattr(IRB140, name))
+    assert robot.wire_frames == IRB140.wire_frames
+    assert robot.notes == ()
+    with pytest.raises(RobotFileError, match="max_velocity"):
+        load_robot(IRB140.model_path, path, max_velocity=1.0)
+
+
+@pytest.mark.parametrize("name", bundled_robots())
+def test_a_starting_toml_loads_as_the_bare_robot(name: str, tmp_path: Path) -> None:
+    """What `qpsafe robots add` writes says what was loaded: limits, frames, wire, home."""
+    from qpsafe.robot.starting_file import starting_robot_toml
+
+    bare = load_robot(load_robot(name).model_path)
+    (tmp_path / "robot.toml").write_text(starting_robot_toml(bare, tmp_path), encoding="utf-8")
+    robot = load_robot(tmp_path)
+    assert robot.wire_frames == bare.wire_frames
+    assert robot.frame_names == bare.frame_names
+    assert set(robot.tool_frames) == set(bare.tool_frames)
+    for key in ("lower", "upper", "max_velocity", "max_acceleration", "home"):
+        np.testing.assert_allclose(getattr(robot, key), getattr(bare, key), rtol=0, atol=1e-7)
+
+
+def test_collision_bodies_of_a_urdf_with_a_held_joint_are_found(tmp_path: Path) -> None:
+    """Self-detection works on what is left when a joint that is not revolute is held."""
+    from qpsafe.sensing.body import body_hulls
+
+    path = urdf(tmp_path, kind="prismatic")
+    box = '<link name="fore"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    path.write_text(path.read_text(encoding="utf-8").replace('<link name="fore">', box), encoding="utf-8")
+    ((body, _, corners),) = body_hulls(load_robot(path))
+    assert body == 1
+    np.testing.assert_allclose(np.abs(corners), 0.05, atol=1e-12)

@@ -1,0 +1,76 @@
+"""`qpsafe demo fixed --robot all`: the first experiment on every bundled robot, in one table."""
+
+from __future__ import annotations
+
+import json as json_module
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from qpsafe.cli.common import print_json, write_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.fixed import FixedExperiment
+    from qpsafe.sim.report import Report
+    from qpsafe.sim.robots_table import RobotRow
+
+
+def every_robot(
+    make: Callable[[str], FixedExperiment],
+    run: Callable[[FixedExperiment, Path], Report],
+    out: Path,
+    json: bool,
+    screen: Console,
+) -> bool:
+    """Run the experiment on every bundled robot and show one table.
+
+    Args:
+        make: Makes the experiment of a robot.
+        run: Runs it and writes its files into a folder.
+        out: Gets a folder for each robot, and robots.json.
+        json: Whether the table goes to standard output as JSON.
+        screen: Where people read.
+
+    Returns:
+        Whether every robot kept every promise.
+    """
+    from qpsafe.robot.loader import bundled_robots
+    from qpsafe.sim.robots_table import robot_row
+
+    rows = []
+    for name in bundled_robots():
+        experiment = make(name)
+        rows.append(robot_row(experiment.robot, run(experiment, out / name)))
+    table = [row.to_dict() for row in rows]
+    write_text(out / "robots.json", json_module.dumps(table, indent=2) + "\n")
+    if json:
+        print_json(table)
+    else:
+        show_robots(rows, screen)
+        screen.print(f"written to {out}: robots.json and a folder for each robot", highlight=False)
+    return all(row.kept for row in rows)
+
+
+def show_robots(rows: list[RobotRow], screen: Console) -> None:
+    """Print the table."""
+    from rich.table import Table
+
+    table = Table(title="First experiment on every bundled robot")
+    table.add_column("robot")
+    for heading in ("joints", "links", "in order", "peak CDF", "limits", "gained, mm", "kept"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in rows:
+        good, of = row.in_order
+        table.add_row(
+            row.robot,
+            str(row.joints),
+            str(row.links),
+            f"{good} of {of}",
+            f"{row.peak:.1f}",
+            "held" if row.limits_held else "[red]PASSED[/]",
+            " ".join(f"{1e3 * value:+.0f}" for value in row.gained),
+            "[green]yes[/]" if row.kept else "[red]NO[/]",
+        )
+    screen.print(table)

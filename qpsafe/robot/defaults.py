@@ -1,0 +1,116 @@
+"""Describing a robot from its model file alone, with defaults that are said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import RobotFileError
+from qpsafe.robot.model_file import ModelFile
+from qpsafe.robot.spec import RobotSpec
+
+#: Full speed is reached in this time where no acceleration is stated [s]; neither MJCF nor URDF can state one.
+FULL_SPEED_TIME = 0.25
+#: Speed limit where the file states none [rad/s]: slow, about 57 deg/s.
+DEFAULT_MAX_VELOCITY = 1.0
+_NO_LIMIT = 1e6  # readers write huge numbers, or zero, for "no limit"
+
+
+def spec_from_model(path: Path, file: ModelFile, given: dict[str, ArrayLike]) -> RobotSpec:
+    """Describe a robot from its model file alone.
+
+    Frames are all frames of the model. The wire follows the joint tree: a link from each joint's origin to the next
+    ones, and from every last joint to the frame farthest from it. Where the file states no speed, 1 rad/s is taken;
+    accelerations reach full speed in 0.25 s; home is zero, moved inside the limits.
+
+    Args:
+        path: The model file.
+        file: What was read from it.
+        given: Overrides: lower, upper, max_velocity, max_acceleration, home; each one number or (n,).
+
+    Raises:
+        RobotFileError: A limit makes no sense.
+    """
+    model, notes = file.model, list(file.notes)
+    names = tuple(model.names)[1:]
+    speed = np.array(model.velocityLimit)
+    unstated = ~(np.isfinite(speed) & (speed > 0.0) & (speed < _NO_LIMIT))
+    if unstated.any() and "max_velocity" not in given:
+        which = ", ".join(name for name, missing in zip(names, unstated, strict=True) if missing)
+        notes.append(f"no speed limit in the file, {DEFAULT_MAX_VELOCITY:g} rad/s is taken: {which}")
+    values = {
+        "lower": _per_joint(path, "lower", given.get("lower", model.lowerPositionLimit), model.nq),
+        "upper": _per_joint(path, "upper", given.get("upper", model.upperPositionLimit), model.nq),
+        "max_velocity": _per_joint(
+            path, "max_velocity", given.get("max_velocity", np.where(unstated, DEFAULT_MAX_VELOCITY, speed)), model.nq
+        ),
+    }
+    if "max_acceleration" not in given:
+        notes.append(f"no accelerations can be stated in the file: full speed in {FULL_SPEED_TIME:g} s is taken")
+    default = values["max_velocity"] / FULL_SPEED_TIME
+    values["max_acceleration"] = _per_joint(path, "max_acceleration", given.get("max_acceleration", default), model.nq)
+    _check_limits(path, names, values)
+    home = np.clip(np.zeros(model.nq), values["lower"], values["upper"])
+    home = _per_joint(path, "home", given.get("home", home), model.nq)
+    for name, value, low, high in zip(names, home, values["lower"], values["upper"], strict=True):
+        if not low <= value <= high:
+            raise RobotFileError(path, f"{name}.home", float(value), f"within {low:g} to {high:g} rad")
+    if "home" not in given:
+        notes.append("no home pose is stated: all joints at zero, moved inside their limits")
+    return RobotSpec(
+        name=model.name or path.stem,
+        title=model.name or path.stem,
+        folder=path.parent,
+        model_path=path,
+        joint_names=names,
+        home=home,
+        frames={frame.name: frame.name for frame in model.frames},
+        wire_frames=wire_from_tree(model),
+        notes=tuple(notes),
+        lower=values["lower"],
+        upper=values["upper"],
+        max_velocity=values["max_velocity"],
+        max_acceleration=values["max_acceleration"],
+    )
+
+
+def wire_from_tree(model: Any) -> tuple[tuple[str, str], ...]:
+    """Links of the wire along the joint tree of a model: from each joint to its children, and to the tips.
+
+    The tip of a joint that carries no other is the frame that moves with it and lies farthest from its origin.
+    """
+    links = [(model.names[model.parents[i]], model.names[i]) for i in range(1, model.njoints)]
+    for i in range(1, model.njoints):
+        if i in list(model.parents)[1:]:
+            continue
+        far, tip = 2e-9, None
+        for frame in model.frames:
+            distance = float(np.linalg.norm(frame.placement.translation))
+            if frame.parentJoint == i and frame.name != model.names[i] and distance >= far - 1e-9:
+                far, tip = distance, frame.name
+        if tip is not None:
+            links.append((model.names[i], tip))
+    return tuple(links)
+
+
+def _check_limits(path: Path, names: tuple[str, ...], values: dict[str, NDArray[np.float64]]) -> None:
+    for key, array in values.items():
+        for name, value in zip(names, array, strict=True):
+            if not (np.isfinite(value) and abs(value) < _NO_LIMIT):
+                raise RobotFileError(path, f"{name}.{key}", float(value), "a finite limit")
+            if key.startswith("max_") and not value > 0:
+                raise RobotFileError(path, f"{name}.{key}", float(value), "a number above zero")
+    for name, low, high in zip(names, values["lower"], values["upper"], strict=True):
+        if not low < high:
+            raise RobotFileError(path, f"{name}.lower", float(low), f"less than upper = {float(high)!r} rad")
+
+
+def _per_joint(path: Path, key: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
+    """One number for every joint, or one for each, as an array (n,)."""
+    try:
+        return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)))
+    except (TypeError, ValueError):
+        raise RobotFileError(path, key, value, f"one number or {n} numbers") from None

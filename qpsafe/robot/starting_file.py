@@ -1,0 +1,83 @@
+"""A first robot.toml for a model file, for a person to correct."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from qpsafe.robot.robot import Robot
+
+
+def starting_robot_toml(robot: Robot, folder: Path) -> str:
+    """The text of a robot.toml that says what was found in a bare model file and what was assumed.
+
+    Args:
+        robot: Loaded from the model file alone.
+        folder: Where the file will stand; the model is named relative to it where it is below.
+    """
+    model = robot.model_path.resolve()
+    name = os.path.relpath(model, folder.resolve()) if folder.resolve() in model.parents else str(model)
+    lines = [
+        f"# {robot.title}: written by `qpsafe robots add` from {robot.model_path.name}. Check every value, above all:",
+        *(f"# - {note}" for note in robot.notes),
+        "",
+        f"name = {_text(robot.name)}",
+        f"title = {_text(robot.title)}",
+        f"model = {_text(name)}",
+        '# spots = "spots.toml"             # distance sensors, if it carries any',
+        f"home = [{', '.join(_degrees(value) for value in robot.home)}]",
+        "",
+        "[units]",
+        'length = "m"',
+        'angle = "deg"',
+        'mass = "kg"',
+        'time = "s"',
+        "",
+    ]
+    for i, joint in enumerate(robot.joint_names):
+        lines += [f"[joints.{_text(joint)}]"]
+        for key in ("lower", "upper", "max_velocity", "max_acceleration"):
+            lines += [f"{key} = {_degrees(getattr(robot, key)[i])}"]
+        lines += [""]
+    lines += ["# Name in qpsafe -> site, body or link of the model. Rename as you like.", "[frames]"]
+    lines += [f"{_text(frame)} = {_text(frame)}" for frame in robot.frame_names]
+    lines += [
+        "",
+        "# The segments whose motion makes the danger field, eq. (4), along the joint tree.",
+        "[wire]",
+        "links = [",
+    ]
+    lines += [f"    [{_text(start)}, {_text(end)}]," for start, end in robot.wire_frames]
+    lines += ["]", ""]
+    several = len(robot.tool_frames) > 1
+    for frame in robot.tool_frames:
+        mount = next((start for start, end in robot.wire_frames if end == frame), frame)
+        offset = _offset(robot, mount, frame)
+        lines += [
+            "# Assumed: the tool ends where the wire ends. Its mass is for people only.",
+            "[[tool]]" if several else "[tool]",
+            f"frame = {_text(frame)}",
+            f"mounted_on = {_text(mount)}",
+            f"offset = [{', '.join(repr(round(value, 9) + 0.0) for value in offset)}]",
+            "mass = 0.0",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _offset(robot: Robot, mount: str, frame: str) -> list[float]:
+    """The tip in the frame that it is mounted on [m]."""
+    pose = robot.pose(mount, robot.home)
+    offset = pose[:3, :3].T @ (robot.pose(frame, robot.home)[:3, 3] - pose[:3, 3])
+    return [float(value) for value in offset]
+
+
+def _degrees(radians: float) -> str:
+    return repr(round(math.degrees(radians), 6) + 0.0)
+
+
+def _text(value: str) -> str:
+    """A TOML string (also fine as a key)."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,174 @@
+"""What can be wrong with a URDF file, found before a reader that would say only that it is invalid."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from qpsafe.errors import RobotFileError
+
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+
+
+def check_urdf(path: Path, root: Element) -> list[str]:
+    """Check names, tree, numbers and mesh files of a URDF.
+
+    Returns:
+        Notes on what is doubtful.
+
+    Raises:
+        RobotFileError: Names the element that is wrong.
+    """
+    links = _named(path, root, "link")
+    joints = _named(path, root, "joint")
+    if not links:
+        raise RobotFileError(path, "link", None, "at least one <link>")
+    _check_tree(path, links, joints)
+    for name, joint in joints.items():
+        _check_joint(path, f"joint {name}", joint)
+    empty = []
+    for name, link in links.items():
+        if not _check_inertia(path, f"link {name}", link):
+            empty.append(name)
+        _check_meshes(path, f"link {name}", link)
+    moved = {joint.find("child").get("link") for joint in joints.values() if joint.get("type") != "fixed"}  # type: ignore[union-attr]
+    empty = [name for name in empty if name in moved]
+    notes = []
+    if empty:
+        notes.append(f"no mass or inertia is given for what moves: {', '.join(empty)} (only simulations need it)")
+    mimics = [name for name, joint in joints.items() if joint.find("mimic") is not None]
+    if mimics:
+        notes.append(f"joints that mimic others are held, not moved along: {', '.join(mimics)}")
+    return notes
+
+
+def package_folders(path: Path) -> list[str]:
+    """Folders in which package:// addresses of a URDF are looked up: those above it, and ROS's own."""
+    found = [str(folder) for folder in path.resolve().parents]
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            found += [entry, str(Path(entry) / "share")]
+    return found
+
+
+def _named(path: Path, root: Element, tag: str) -> dict[str, Element]:
+    result: dict[str, Element] = {}
+    for i, element in enumerate(root.findall(tag)):
+        name = element.get("name")
+        if not name:
+            raise RobotFileError(path, f"{tag} number {i + 1}: name", name, "a name")
+        if name in result:
+            raise RobotFileError(path, f"{tag} {name}: name", name, f"a name of its own: another {tag} has it too")
+        result[name] = element
+    return result
+
+
+def _check_tree(path: Path, links: dict[str, Element], joints: dict[str, Element]) -> None:
+    parents: dict[str, tuple[str, str]] = {}  # child link -> (parent link, joint)
+    for name, joint in joints.items():
+        ends: list[str] = []
+        for role in ("parent", "child"):
+            element = joint.find(role)
+            end = None if element is None else element.get("link")
+            if end is None or end not in links:
+                raise RobotFileError(path, f"joint {name}: {role}", end, "a link of the file: " + ", ".join(links))
+            ends.append(end)
+        parent, child = ends
+        if child in parents:
+            expected = f"a link without a parent: joint {parents[child][1]} already carries it"
+            raise RobotFileError(path, f"joint {name}: child", child, expected)
+        parents[child] = (parent, name)
+    for start in links:
+        seen, link = [start], start
+        while link in parents:
+            link, by = parents[link]
+            if link in seen:
+                loop = " -> ".join(reversed([*seen[seen.index(link) :], link]))
+                expected = f"a tree, but these links form a loop: {loop}"
+                raise RobotFileError(path, f"joint {by}: parent", link, expected)
+            seen.append(link)
+    roots = [link for link in links if link not in parents]
+    if len(roots) > 1:
+        expected = f"one tree, but nothing joins these links: {', '.join(roots)}"
+        raise RobotFileError(path, f"link {roots[1]}", roots[1], expected)
+
+
+def _check_joint(path: Path, where: str, joint: Element) -> None:
+    kind = joint.get("type")
+    if kind not in JOINT_TYPES:
+        raise RobotFileError(path, f"{where}: type", kind, "one of " + ", ".join(JOINT_TYPES))
+    axis = joint.find("axis")
+    if axis is not None:
+        values = _numbers(path, f"{where}: axis", axis.get("xyz"), 3)
+        if kind in ("revolute", "continuous", "prismatic") and not np.linalg.norm(values) > 1e-9:
+            raise RobotFileError(path, f"{where}: axis", axis.get("xyz"), "a direction, not three zeros")
+    origin = joint.find("origin")
+    if origin is not None:
+        for key in ("xyz", "rpy"):
+            if origin.get(key) is not None:
+                _numbers(path, f"{where}: origin {key}", origin.get(key), 3)
+    limit = joint.find("limit")
+    if kind in ("revolute", "prismatic"):
+        if limit is None:
+            raise RobotFileError(path, f"{where}: limit", None, f"a <limit>: the joint is {kind}")
+        low, high = (_numbers(path, f"{where}: limit {key}", limit.get(key, "0"), 1)[0] for key in ("lower", "upper"))
+        if not low <= high:
+            raise RobotFileError(path, f"{where}: limit lower", float(low), f"at most upper = {float(high)!r}")
+    if limit is not None:
+        for key in ("velocity", "effort"):
+            if limit.get(key) is not None:
+                _numbers(path, f"{where}: limit {key}", limit.get(key), 1, finite=False)
+
+
+def _check_inertia(path: Path, where: str, link: Element) -> bool:
+    """Whether the link has a mass and an inertia that a body can have."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return False
+    element = inertial.find("mass")
+    mass = 0.0 if element is None else float(_numbers(path, f"{where}: mass", element.get("value"), 1)[0])
+    if mass < 0.0:
+        raise RobotFileError(path, f"{where}: mass", mass, "a mass >= 0 [kg]")
+    element = inertial.find("inertia")
+    if element is None:
+        return False
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    xx, xy, xz, yy, yz, zz = (float(_numbers(path, f"{where}: inertia {k}", element.get(k, "0"), 1)[0]) for k in keys)
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if moments[0] < -1e-9 * max(1.0, moments[2]):
+        found = [round(float(m), 9) for m in moments]
+        raise RobotFileError(path, f"{where}: inertia", found, "principal moments >= 0 [kg m²]")
+    return mass > 0.0 and bool(moments[2] > 0.0)
+
+
+def _check_meshes(path: Path, where: str, link: Element) -> None:
+    for shape in link.iterfind("collision/geometry/mesh"):
+        name = shape.get("filename")
+        if not name:
+            raise RobotFileError(path, f"{where}: collision mesh", name, "a file name")
+        if not any(place.is_file() for place in _places(path, name)):
+            expected = "a file that is there; looked for it beside the file, and package:// in the folders above it"
+            raise RobotFileError(path, f"{where}: collision mesh", name, expected)
+
+
+def _places(path: Path, name: str) -> Iterator[Path]:
+    if name.startswith("package://"):
+        for folder in package_folders(path):
+            yield Path(folder) / name.removeprefix("package://")
+    else:
+        yield path.parent / name.removeprefix("file://")
+
+
+def _numbers(path: Path, key: str, text: str | None, count: int, finite: bool = True) -> np.ndarray:
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != (count,) or (not np.isfinite(values).all() if finite else np.isnan(values).any()):
+        what = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise RobotFileError(path, key, text, what)
+    return values
