@@ -57,10 +57,13 @@ def timeline(run: PickRun, people: Sequence[str], path: Path, title: str = "") -
             times = run.times(*kinds)
             axes[3].plot(times, np.full(len(times), -row), linestyle="none", color=colour, marker=marker, markersize=5)
             labels.append(f"{name} ({len(times)})")
-        for event in run.events:
-            if event.person >= 0:
+        last = -np.inf
+        for event in (e for e in run.events if e.kind in ("take", "place")):
+            time = event.tick * log.dt
+            if time > last + 5.0:  # one name for what is done in one visit
                 row = 2 if event.kind == "take" else 3
-                axes[3].annotate(people[event.person], (event.tick * log.dt + 0.8, -row), fontsize=7, va="center")
+                axes[3].annotate(f"{people[event.person]} ", (time - 0.8, -row), fontsize=7, va="center", ha="right")
+            last = time
         axes[3].set(yticks=-np.arange(len(ROWS)), yticklabels=labels, ylim=(0.6 - len(ROWS), 0.6), xlabel="time [s]")
         axes[3].set_xlim(0.0, log.time[-1])
         if title:

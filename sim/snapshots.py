@@ -65,14 +65,14 @@ def moments(run: PickRun) -> list[Moment]:
     if first is not None:
         taken = event("take", first.first, first.last)
         assert taken is not None
-        add("c", taken, "a person takes a screw from the box")
-        add("d", _peak(run.log, first), "evasive action at the highest danger")
+        add("c", taken, "a person takes a screw")
+        add("d", _peak(run.log, first), "evasive action, danger highest")
         add("e", event("release", first.last), "resumes its task, drops the screw")
         others = [v for v in there if v.first > first.last and v.person not in (first.person, -1)]
         if others:
             second = others[0]
-            add("f", second.first, "another person comes from another side")
-            add("g", _peak(run.log, second), "evasive action at the highest danger")
+            add("f", second.first, "another person comes")
+            add("g", _peak(run.log, second), "evasive action, danger highest")
             add("h", _resumed(run.log, second), "the person leaves, the task goes on")
     return found
 
