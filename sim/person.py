@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from qpsafe.sim.anatomy import FIRST, HEEL_OFF, LEG_USED, SEGMENTS, Body, Segment
 from qpsafe.sim.posture import Point, Posture, Stoop, least_stoop, place_hands
 
-__all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "Segment", "two_link"]
+__all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "Segment", "axis_quaternions", "two_link"]
 
 Array = NDArray[np.float64]
 _Point = tuple[float, float, float]
@@ -113,7 +113,7 @@ def two_link(roots: Array, targets: Array, upper: Array, lower: Array, bends: Ar
     return roots + feet[:, None] * along + heights[:, None] * across, roots + distances[:, None] * along
 
 
-def _axis_quaternions(directions: Array) -> Array:
+def axis_quaternions(directions: Array) -> Array:
     """Shortest rotations that turn z into the given unit directions: (k, 3) -> (k, 4)."""
     quaternions = np.stack(
         [1.0 + directions[:, 2], -directions[:, 1], directions[:, 0], np.zeros(len(directions))], axis=1
@@ -225,7 +225,7 @@ class Person:
         return PersonPose(
             ends=ends,
             positions=0.5 * (ends[:, 0] + ends[:, 1]),
-            quaternions=_axis_quaternions(axes / np.sqrt((axes * axes).sum(axis=1))[:, None]),
+            quaternions=axis_quaternions(axes / np.sqrt((axes * axes).sum(axis=1))[:, None]),
             board_position=None if face is None else face - thickness / 2 * out,
             board_quaternion=None if face is None else np.array([math.cos(facing / 2), 0, 0, math.sin(facing / 2)]),
             board_face=face,

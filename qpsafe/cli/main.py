@@ -16,6 +16,7 @@ from qpsafe.cli import (
     demo,
     irc5_faults,
     irc5_sim,
+    place,
     replay,
     robots,
     sick_sensors,
@@ -37,6 +38,7 @@ app.command("bench")(bench.bench)
 app.command("calibrate")(calibrate.calibrate)
 app.command("story")(story.story)
 app.command("replay")(replay.replay)
+app.command("place")(place.place)
 app.command("sick-sensors")(sick_sensors.sick_sensors)
 app.command("stream")(stream.stream)
 app.command("irc5-sim")(irc5_sim.irc5_sim)

@@ -16,7 +16,7 @@ from qpsafe.robot.model_file import ModelFile, read_model
 from qpsafe.robot.package_model import find_package_model, is_package_model
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
-from qpsafe.robot.spec import DHChain, RobotSpec, Tool
+from qpsafe.robot.spec import DHChain, Region, RobotSpec, Tool
 
 _TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
 
@@ -146,6 +146,20 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         chains.append(DHChain(rows, tuple(table.frames), tuple(names.index(name) for name in order)))
     danger = file.danger
     spots = None if file.spots is None else path.parent / file.spots
+    regions = tuple(
+        Region(
+            r.name,
+            r.link - 1,
+            r.frame or file.denavit_hartenberg[0].frames[r.link],
+            m * np.array(r.lower),
+            m * np.array(r.upper),
+            None if r.mesh is None else path.parent / r.mesh,
+            m,
+            r.at_most,
+            r.self_sight,
+        )
+        for r in file.regions
+    )
     return RobotSpec(
         name=file.name,
         title=file.title,
@@ -165,6 +179,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         tools=tuple(Tool(t.frame, t.mounted_on, m * np.array(t.offset), t.mass) for t in file.tool),
         chains=tuple(chains),
         danger=None if danger is None else ((danger.delta, danger.epsilon), (danger.delta_f, danger.epsilon_f)),
+        regions=regions,
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.kinematics import tree_of
-from qpsafe.robot.spec import RobotSpec, Tool
+from qpsafe.robot.spec import Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
 
@@ -51,6 +51,7 @@ class Robot:
         danger: (Δ, ε) and (Δ_f, ε_f) as the robot's file states them, or None.
         notes: What is missing or doubtful in the robot's files, in words; empty if nothing is.
         spots_path: File of the distance sensors, or None where there is none.
+        regions: Parts of the surface that may carry distance sensors.
         model: The pinocchio model.
     """
 
@@ -61,6 +62,7 @@ class Robot:
         self.folder: Path = spec.folder
         self.model_path: Path = spec.model_path
         self.spots_path: Path | None = spec.spots_path
+        self.regions: tuple[Region, ...] = spec.regions
         self.model = model
         self.nq: int = model.nq
         self.joint_names = spec.joint_names

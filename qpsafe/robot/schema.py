@@ -101,6 +101,25 @@ class DangerTable(_Table):
     epsilon_f: Fraction
 
 
+class RegionTable(_Table):
+    """A part of the surface that may carry sensors: what lies in a box, in the frame of the link that carries them.
+
+    `link` counts wire links from 1. `frame` is the Denavit-Hartenberg frame of the link if it is not given. `mesh` is a
+    file in the robot's folder, in that frame and in the file's unit of length; the model's own geometry if not given.
+    `at_most` sensors are put there, any number if not given. `self_sight` is the share of random
+    configurations in which a place there may see the robot itself from close by.
+    """
+
+    name: Name
+    link: Annotated[int, pydantic.Field(strict=True, ge=1)]
+    frame: Name | None = None
+    lower: Annotated[list[Number], pydantic.Field(min_length=3, max_length=3)]
+    upper: Annotated[list[Number], pydantic.Field(min_length=3, max_length=3)]
+    mesh: Name | None = None
+    at_most: Annotated[int, pydantic.Field(strict=True, ge=0)] | None = None
+    self_sight: Annotated[float, pydantic.Field(strict=True, ge=0.0, le=1.0)] = 0.02
+
+
 class RobotFile(_Table):
     """A whole `robot.toml`, in the units of the file."""
 
@@ -117,6 +136,7 @@ class RobotFile(_Table):
     wire: WireTable
     tool: tuple[ToolTable, ...] = ()
     danger: DangerTable | None = None
+    regions: list[RegionTable] = []
 
     @pydantic.field_validator("tool", "denavit_hartenberg", mode="before")
     @classmethod
@@ -191,6 +211,27 @@ def check(path: Path, file: RobotFile) -> None:
     if danger is not None and danger.delta_f * (1.0 + danger.epsilon_f) > danger.delta * (1.0 - danger.epsilon):
         expected = "delta_f (1 + epsilon_f) <= delta (1 - epsilon), or two levels of Table I overlap"
         raise RobotFileError(path, "danger.delta_f", danger.delta_f, expected)
+    for i, region in enumerate(file.regions):
+        _check_region(path, f"regions[{i}]", region, file)
+    names = [region.name for region in file.regions]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise RobotFileError(path, f"regions[{i}].name", name, "a name of its own")
+
+
+def _check_region(path: Path, key: str, region: RegionTable, file: RobotFile) -> None:
+    if region.link > len(file.wire.links):
+        raise RobotFileError(path, f"{key}.link", region.link, f"a link in 1..{len(file.wire.links)}")
+    if region.frame is not None:
+        _known_frames(path, f"{key}.frame", [region.frame], file.frames)
+    elif len(file.denavit_hartenberg) != 1 or region.link >= len(file.denavit_hartenberg[0].frames):
+        expected = "a frame: the link has no Denavit-Hartenberg one"
+        raise RobotFileError(path, f"{key}.frame", None, expected)
+    for low, high in zip(region.lower, region.upper, strict=True):
+        if not low < high:
+            raise RobotFileError(path, f"{key}.lower", region.lower, f"below upper = {region.upper} on each axis")
+    if region.mesh is not None and not (path.parent / region.mesh).is_file():
+        raise RobotFileError(path, f"{key}.mesh", region.mesh, "a mesh file in the same folder")
 
 
 def table_key(name: str, i: int, count: int) -> str:

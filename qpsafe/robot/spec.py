@@ -40,6 +40,32 @@ class DHChain(NamedTuple):
     joints: tuple[int, ...]
 
 
+class Region(NamedTuple):
+    """A part of the surface that may carry distance sensors, section III.
+
+    Attributes:
+        name: Shown in the names of its sensors.
+        link: Wire link that carries them, counted from 0.
+        frame: Frame in which the box, and the mesh if there is one, are given.
+        lower: Corner of the box, (3,) [m].
+        upper: The opposite corner, (3,) [m].
+        mesh: File of the surface in that frame; None: that of the body the frame is fixed to, as the model has it.
+        scale: Metres in one unit of the mesh file.
+        at_most: How many sensors may be put there; None for any number.
+        self_sight: Share of random configurations in which a place may see the robot itself from close by.
+    """
+
+    name: str
+    link: int
+    frame: str
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    mesh: Path | None = None
+    scale: float = 1.0
+    at_most: int | None = None
+    self_sight: float = 0.02
+
+
 @dataclass(frozen=True)
 class RobotSpec:
     """A robot described in SI units; arrays are in the order of the model's joints.
@@ -63,6 +89,7 @@ class RobotSpec:
         notes: What is missing or doubtful in the robot's files, in words.
         spots_path: File of distance sensors, or None where there is none.
         manufacturer: Who makes it.
+        regions: Parts of the surface that may carry distance sensors.
     """
 
     name: str
@@ -83,3 +110,4 @@ class RobotSpec:
     notes: tuple[str, ...] = ()
     spots_path: Path | None = None
     manufacturer: str = ""
+    regions: tuple[Region, ...] = ()

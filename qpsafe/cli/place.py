@@ -1,0 +1,192 @@
+"""`qpsafe place`: how many distance sensors a robot needs, and where, section III of the source."""
+
+from __future__ import annotations
+
+import json as json_module
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.errors import ConfigurationError
+from qpsafe.placement.objective import Objective, check_request
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from qpsafe.placement.study import Study
+
+
+def place(
+    robot: Annotated[str, typer.Argument(help="A bundled robot, or the path of a robot folder.")] = "irb140",
+    spots: Annotated[
+        int | None, typer.Option(help="How many there are; 20 if not given, or as many as the regions take.")
+    ] = None,
+    probability: Annotated[
+        float | None, typer.Option(help="Instead: find the fewest that reach this detection probability, eq. (13).")
+    ] = None,
+    objective: Annotated[
+        Objective, typer.Option(help="cost: (10)-(12). The others do not pay for redundant spots.")
+    ] = Objective.detection,
+    caps: Annotated[
+        bool, typer.Option(help="Respect at_most of the regions (not for the curves, nor for (13)).")
+    ] = True,
+    nodes: Annotated[int, typer.Option(help="Wanted number of candidate nodes.")] = 254,
+    pairs: Annotated[int, typer.Option(help="Random pairs of robot and person, of each of the two samples.")] = 3000,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
+    radius: Annotated[
+        float | None, typer.Option(help="People stand this near to the base axis [m]; default: the robot's reach.")
+    ] = None,
+    pedestal: Annotated[float, typer.Option(help="Height of the robot's base above the floor [m].")] = 0.55,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: as many as processors, 1: this one only.")] = 1,
+    time_limit: Annotated[float, typer.Option(min=0.0, help="For the 0-1 programme [s].")] = 30.0,
+    exact: Annotated[bool, typer.Option(help="Solve the 0-1 programme; else greedy and its bound only.")] = True,
+    pictures: Annotated[
+        bool, typer.Option(help="Draw the robot with nodes and spots, where OpenGL is to be had.")
+    ] = True,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/place"),
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Place distance sensors: candidate nodes, Monte Carlo simulation, optimisation, Fig. 9, and a spots.toml.
+
+    Everything is optimised on one sample of random pairs and judged on another, independent one.
+    """
+    screen = console(json)
+    check_request(nodes, spots, probability)
+    if pairs < 1:
+        raise ConfigurationError("qpsafe place", "pairs", pairs, "a number of pairs >= 1")
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.placement.candidates import candidate_nodes
+    from qpsafe.placement.knapsack import check_spots
+    from qpsafe.placement.spots_toml import spots_toml
+    from qpsafe.placement.study import study, to_dict
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.placement_figures import figure_9
+    from qpsafe.sim.placement_run import MonteCarlo
+
+    machine = load_robot(robot)
+    found = candidate_nodes(machine, nodes)
+    check_request(len(found), spots, probability)
+    limits = found.caps(machine) if caps else None
+    count = spots or min(20, len(found) if limits is None else limits.room())
+    check_spots(count, len(found), limits)
+    text = f"{len(found)} nodes, {1e3 * found.spacing:.1f} mm apart, on {len(machine.regions)} regions"
+    screen.print(text, style="dim", highlight=False)
+    simulation = MonteCarlo(machine, found, seed=seed, radius=radius, pedestal=pedestal)
+    samples = []
+    with _executor(workers) as executor, progress_bar(screen) as progress:
+        for number, name in enumerate(("pairs to optimise for", "independent pairs")):
+            task = progress.add_task(name, total=pairs)
+            samples.append(simulation.sample(pairs, number, executor, partial(_completed, progress, task)))
+    with screen.status("optimising ...") as status:
+        result = study(
+            found,
+            (samples[0], samples[1]),
+            objective,
+            spots=count,
+            probability=probability,
+            caps=limits,
+            time_limit=time_limit,
+            exact=exact,
+            progress=lambda name: status.update(f"optimising: {name} ..."),
+        )
+    report = to_dict(result) | {
+        "robot": machine.name,
+        "seed": seed,
+        "radius": simulation.setup.radius,
+        "pedestal": pedestal,
+    }
+    chosen = result.answer.solution.chosen
+    out.mkdir(parents=True, exist_ok=True)
+    figure_9(result, out / "figure-9.png", machine.title)
+    if pictures:
+        _draw(machine, found, chosen, out, screen)
+    write_text(out / "report.json", json_module.dumps(report, indent=2) + "\n")
+    write_text(out / "spots.toml", spots_toml(found, chosen.tolist(), _remark(machine.title, result, seed, pairs)))
+    if json:
+        print_json(report)
+    else:
+        show(result, screen)
+        screen.print(f"written to {out}: spots.toml, report.json, figure-9.png", highlight=False)
+
+
+def _completed(progress: Progress, task: TaskID, done: int) -> None:
+    progress.update(task, completed=done)
+
+
+@contextmanager
+def _executor(workers: int) -> Iterator[Executor | None]:
+    """Local worker processes, None for none; what waits is dropped on Ctrl-C."""
+    count = workers or os.cpu_count() or 1
+    if count == 1:
+        yield None
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _draw(machine: Any, found: Any, chosen: Any, out: Path, screen: Console) -> None:
+    from qpsafe.sim.gl import gl_available
+
+    available, why = gl_available()
+    if not available:
+        screen.print(f"no pictures of the robot: {why}", style="yellow")
+        return
+    from qpsafe.sim.placement_picture import save_picture
+
+    save_picture(out / "nodes.png", machine, found.nodes)
+    save_picture(out / "spots.png", machine, found.nodes, chosen)
+
+
+def _remark(title: str, result: Study, seed: int, pairs: int) -> str:
+    """What stands at the head of the file."""
+    answer, found = result.answer, result.candidates
+    goal = "fewest spots for a probability, eq. (13)" if answer.objective == "probability" else answer.objective
+    return (
+        f"{len(answer.solution.chosen)} spots on the {title}, chosen by `qpsafe place` out of {len(found)} nodes "
+        f"{1e3 * found.spacing:.0f} mm apart for the objective: {goal} (seed {seed}, {pairs} pairs, "
+        f"{answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
+        f"{100 * answer.fair.probability:.1f} % of an independent sample (95 %: {100 * answer.fair.low:.1f} to "
+        f"{100 * answer.fair.high:.1f}). position [m] and direction (unit) are given in the frame of the link that "
+        "carries the spot, eq. (7); link counts wire links from 1: the spot's danger vector acts there, eq. (8)."
+    )
+
+
+def show(result: Study, screen: Console) -> None:
+    """Print the placements and the chosen spots."""
+    from rich.table import Table
+
+    pairs = result.samples[1].pairs
+    table = Table(title=f"Judged on {pairs} independent pairs, but for column 5")
+    for heading in ("objective", "spots", "detected", "95 %", "optimised", "danger", "method", "gap"):
+        justify: Any = "left" if heading in ("objective", "method") else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    for name, item in result.placements.items():
+        fair, solution = item.fair, item.solution
+        table.add_row(
+            ("> " if name == result.wanted else "") + ("(13)" if name == "probability" else name),
+            str(len(solution.chosen)),
+            f"{100 * fair.probability:.1f} %",
+            f"{100 * fair.low:.1f}-{100 * fair.high:.1f}",
+            f"{100 * item.flattered.probability:.1f} %",
+            f"{100 * fair.danger:.1f} %",
+            solution.method,
+            f"{100 * solution.gap:.1f} %",
+        )
+    screen.print(table)
+    names = [result.candidates.nodes.names[i] for i in result.answer.solution.chosen]
+    screen.print("chosen: " + ", ".join(names), highlight=False)

@@ -1,0 +1,214 @@
+"""Candidate nodes of section III: where a sensor could sit on the robot's surface, with the matrices of eq. (7)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.placement.coverage import Caps
+from qpsafe.placement.grid import NEAREST, lattice, looks_out, thin_out
+from qpsafe.placement.sight import SelfSight
+from qpsafe.placement.surface import Surface, link_surface
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.spots import Spot, SpotArray
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+    from qpsafe.robot.spec import Region
+
+Array = NDArray[np.float64]
+
+#: How many candidates the source has on its IRB 140.
+SOURCE_NODES = 254
+COARSE = 0.015  # lattice that measures a region [m]
+FINE = 5.0  # the lattice that fills gaps is finer than the grid by this
+_ROUNDS = 12  # of the search for the spacing of a wanted number
+
+
+class Sensor(NamedTuple):
+    """What is to be placed.
+
+    Attributes:
+        name: For the file.
+        range_min, range_max: A detection counts between these distances [m].
+        field_of_view: Full opening angle [rad]; for the file only, the placement looks along the axis.
+    """
+
+    name: str = "Sharp GP2Y0A02YK"
+    range_min: float = 0.20
+    range_max: float = 0.80
+    field_of_view: float = float(np.deg2rad(6.0))
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Candidate nodes.
+
+    Attributes:
+        nodes: One possible sensor each, n_nodes of them.
+        spacing: Of the grid [m].
+        sensor: What is to be placed.
+        region: Of each node, its place among the robot's regions, (n_nodes,).
+    """
+
+    nodes: SpotArray
+    spacing: float
+    sensor: Sensor
+    region: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def caps(self, robot: Robot) -> Caps:
+        """How many spots the robot's regions take."""
+        most = [len(self) if region.at_most is None else region.at_most for region in robot.regions]
+        return Caps(self.region, np.array(most, dtype=np.int64))
+
+
+def candidate_nodes(
+    robot: Robot, wanted: int = SOURCE_NODES, *, spacing: float | None = None, sensor: Sensor | None = None
+) -> Candidates:
+    """An equally spaced grid of nodes on the regions of the robot's surface, see `qpsafe.placement.grid`.
+
+    Args:
+        robot: With `[[regions]]` in its robot.toml.
+        wanted: Number of nodes; the spacing is searched that gives it, or the number nearest to it.
+        spacing: Use this one instead [m].
+        sensor: What is to be placed; by default the Sharp sensor from 20 to 80 cm.
+
+    Raises:
+        RobotFileError: The robot has no region, or nothing of the surface looks out freely in one.
+        ConfigurationError: `wanted` is below 1, or the spacing or the sensor's range make no sense.
+    """
+    sensor = Sensor() if sensor is None else sensor
+    if not (0.0 < sensor.range_min < sensor.range_max < np.inf):
+        found = f"{sensor.range_min}..{sensor.range_max}"
+        raise ConfigurationError("candidate_nodes", "sensor", found, "0 < range_min < range_max, finite [m]")
+    if not robot.regions:
+        raise RobotFileError(robot.folder / "robot.toml", "regions", None, "at least one [[regions]] to put sensors on")
+    if not (isinstance(wanted, int) and wanted >= 1):
+        raise ConfigurationError("candidate_nodes", "wanted", wanted, "a number of nodes >= 1")
+    sight = SelfSight(robot, SensingRules().d_min)
+    patches = [_Patch(robot, region, sensor, sight) for region in robot.regions]
+    if spacing is None:
+        # the area that looks out, by a coarse lattice, says what to expect
+        area = sum(len(patch.usable_lattice(COARSE)[0]) for patch in patches) * COARSE**2
+        guess = float(np.sqrt(area / wanted))
+        for patch in patches:
+            patch.refine(guess / FINE)
+        spacing = _spacing_for(patches, wanted, guess)
+    elif np.isfinite(spacing) and 1e-3 <= spacing <= 1.0:
+        for patch in patches:
+            patch.refine(spacing / FINE)
+    else:
+        raise ConfigurationError("candidate_nodes", "spacing", spacing, "0.001 to 1 m")
+    spots: list[Spot] = []
+    region: list[int] = []
+    for i, patch in enumerate(patches):
+        spots += patch.spots(robot, spacing, sensor)
+        region += [i] * (len(spots) - len(region))
+    return Candidates(SpotArray.of(spots), spacing, sensor, np.array(region, dtype=np.int64))
+
+
+class _Patch:
+    """One region: its part of the surface, and a fine lattice on it."""
+
+    def __init__(self, robot: Robot, region: Region, sensor: Sensor, sight: SelfSight) -> None:
+        self.region, self.reach, self.sight = region, sensor.range_max, sight
+        surface = link_surface(robot, region)
+        self.box = np.stack((region.lower, region.upper))
+        near = (surface.skin.max(axis=1) >= region.lower) & (surface.skin.min(axis=1) <= region.upper)
+        self.surface = Surface(surface.skin[near.all(axis=1)], surface.body)
+        self.normals = self.surface.normals()
+        self.fine = self.usable_lattice(COARSE)
+        if not len(self.fine[0]):
+            expected = "a box with some surface of the link in it that does not look at the link itself"
+            where = f"regions ({region.name}).lower"
+            raise RobotFileError(robot.folder / "robot.toml", where, region.lower.tolist(), expected)
+
+    def usable_lattice(self, spacing: float) -> tuple[Array, Array]:
+        """Lattice points in the box that look out, and their normals, (k, 3) each."""
+        points, normals = lattice(self.surface.skin, self.normals, self.box, spacing)
+        inside = ((points >= self.box[0] - 1e-9) & (points <= self.box[1] + 1e-9)).all(axis=1)
+        points, normals = points[inside], normals[inside]
+        free = looks_out(points, normals, self.surface.body, self.reach)
+        points, normals = points[free], normals[free]
+        clear = self.sight.share(self.region.frame, points, normals) <= self.region.self_sight
+        return points[clear], normals[clear]
+
+    def refine(self, pitch: float) -> None:
+        """Lay the fine lattice."""
+        self.fine = self.usable_lattice(max(pitch, 0.001))
+
+    def grid(self, spacing: float) -> tuple[Array, Array]:
+        """Nodes and normals at a spacing, (k, 3) each."""
+        coarse = self.usable_lattice(spacing)
+        points, normals = (np.concatenate(pair) for pair in zip(coarse, self.fine, strict=True))
+        kept = thin_out(points, normals, NEAREST * spacing)
+        return points[kept], normals[kept]
+
+    def spots(self, robot: Robot, spacing: float, sensor: Sensor) -> list[Spot]:
+        points, normals = self.grid(spacing)
+        poses = np.array([node_pose(p, n) for p, n in zip(points, normals, strict=True)])
+        region = self.region
+        sides = _sides(robot.pose(region.frame, robot.home)[:3, :3] @ normals.T)
+        count: Counter[str] = Counter()
+        spots = []
+        for pose, side in zip(poses, sides, strict=True):
+            count[side] += 1
+            name = f"{region.name} {side} {count[side]}"
+            spots.append(Spot(name, region.link, region.frame, pose, *sensor[1:]))
+        return spots
+
+
+def node_pose(point: Array, normal: Array) -> Array:
+    """The constant matrix of eq. (7), (4, 4): origin in the node, z axis along the outward normal."""
+    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
+    x /= np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack((x, np.cross(normal, x), normal), axis=1)
+    pose[:3, 3] = point
+    return pose
+
+
+def _sides(directions: Array) -> list[str]:
+    """What a person calls the sides that directions (3, k) look to while the robot is at home; x is ahead."""
+    names = np.array([["rear", "front"], ["right", "left"], ["under", "top"]])
+    axis = np.abs(directions).argmax(axis=0)
+    return [str(names[a, int(directions[a, i] > 0.0)]) for i, a in enumerate(axis)]
+
+
+def _spacing_for(patches: Sequence[_Patch], wanted: int, guess: float) -> float:
+    """The spacing whose grid has the wanted number of nodes, or the number nearest to it."""
+    counts: dict[float, int] = {}
+
+    def count(spacing: float) -> int:
+        if spacing not in counts:
+            counts[spacing] = sum(len(patch.grid(spacing)[0]) for patch in patches)
+        return counts[spacing]
+
+    low, high = 0.5 * guess, 2.0 * guess
+    while high - low > 1e-3 * guess:  # the number falls with the spacing, if not everywhere
+        middle = 0.5 * (low + high)
+        if count(middle) >= wanted:
+            low = middle
+        else:
+            high = middle
+    for step in range(1, 21):  # around there, on both sides in turn
+        if wanted in counts.values():
+            break
+        count(low * (1.0 + (1 if step % 2 else -1) * 2e-3 * (step // 2)))
+    for _ in range(_ROUNDS):  # then between any two neighbours on different sides of the wanted number
+        if wanted in counts.values():
+            break
+        for a, b in pairwise(sorted(counts)):
+            if abs(a - low) < 0.05 * guess and (counts[a] < wanted) != (counts[b] < wanted):
+                count(0.5 * (a + b))
+    return min(counts, key=lambda spacing: (abs(counts[spacing] - wanted), spacing))

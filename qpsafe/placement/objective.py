@@ -1,0 +1,34 @@
+"""What can be asked of a placement, checked before anything takes long."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from qpsafe.errors import ConfigurationError
+
+
+class Objective(StrEnum):
+    """What a placement of a given number of spots is to be best at."""
+
+    cost = "cost"  # (10) to (12)
+    detection = "detection"  # the probability that any spot detects: (13) the other way round
+    danger = "danger"  # the danger that each link sees; what another node of the link sees already does not pay
+    evasion = "evasion"  # the same, by the torque (14), (15) it makes instead of the danger
+
+
+def check_request(nodes: int, spots: int | None, probability: float | None) -> None:
+    """Refuse what cannot be asked.
+
+    Raises:
+        ConfigurationError: No spots, more spots than nodes, a probability that is none, or both given.
+    """
+    if not nodes >= 1:
+        raise ConfigurationError("placement", "nodes", nodes, "at least 1")
+    if spots is not None and not 1 <= spots <= nodes:
+        raise ConfigurationError("placement", "spots", spots, f"1 to {nodes}, the number of candidate nodes")
+    if probability is None:
+        return
+    if not 0.0 < probability <= 1.0:
+        raise ConfigurationError("placement", "probability", probability, "above 0 and at most 1")
+    if spots is not None:
+        raise ConfigurationError("placement", "spots", spots, "nothing: a probability decides how many, eq. (13)")

@@ -1,0 +1,58 @@
+"""Writing a placement as the `spots.toml` that the controller loads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import wrap
+
+import numpy as np
+
+from qpsafe.placement.candidates import Candidates
+
+
+def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> str:
+    """The text of a `spots.toml` with the chosen nodes, base to tip.
+
+    Positions are rounded to 0.01 mm and directions to 1e-7: the loader makes them unit vectors again.
+
+    Args:
+        candidates: The nodes.
+        chosen: Those that carry a spot.
+        remark: How the placement came about, for people.
+    """
+    nodes, sensor = candidates.nodes, candidates.sensor
+    lines = [f"# {line}" for line in wrap(remark, 118)]
+    lines += [
+        "",
+        f"sensor = {json.dumps(sensor.name)}",
+        f"range_min = {sensor.range_min!r}    # [m]",
+        f"range_max = {sensor.range_max!r}    # [m]",
+        f"field_of_view = {round(float(np.rad2deg(sensor.field_of_view)), 9)!r} # [deg] full angle of the cone it sees",
+    ]
+    for i in sorted(int(i) for i in chosen):
+        lines += [
+            "",
+            "[[spot]]",
+            f"name = {json.dumps(nodes.names[i])}",
+            f"link = {int(nodes.links[i]) + 1}",
+            f"frame = {json.dumps(nodes.frames[i])}",
+            f"position = {_vector(nodes.positions[i], 5)}",
+            f"direction = {_vector(nodes.directions[i], 7)}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def write_spots(path: Path, candidates: Candidates, chosen: Sequence[int], remark: str) -> None:
+    """Write `spots_toml` whole or not at all."""
+    part = path.with_name("." + path.name + ".part")
+    try:
+        part.write_text(spots_toml(candidates, chosen, remark), encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _vector(values: np.ndarray, digits: int) -> str:
+    return "[" + ", ".join(f"{round(float(x), digits) + 0.0:.{digits}f}" for x in values) + "]"

@@ -1,0 +1,225 @@
+"""The whole question of section III answered: how many spots, where, and how well on pairs nobody optimised for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.placement.candidates import Candidates
+from qpsafe.placement.coverage import Caps, Worth, detected_pairs, greedy, progress_of, seen_by_links
+from qpsafe.placement.knapsack import cheapest_order, check_spots, cost
+from qpsafe.placement.milp import Solution, best_choice, least_spots
+from qpsafe.placement.objective import Objective
+from qpsafe.placement.sample import Sample
+from qpsafe.placement.statistics import clopper_pearson
+
+Array = NDArray[np.float64]
+
+
+class Curve(NamedTuple):
+    """Fig. 9 for one order of the nodes, with the first 0, 1, ..., n of them.
+
+    Attributes:
+        order: (n,).
+        counts: Detected pairs, on the sample that was optimised for and on the independent one, (2, n + 1).
+        cost: Cost (11) per pair and node on both [1/m], (2, n + 1).
+        cost_error: Its standard error, (2, n + 1).
+        danger: Share of the danger measured on both: the largest SDF that any node sees, summed over pairs, of the
+            largest there is, (2, n + 1).
+    """
+
+    order: NDArray[np.intp]
+    counts: NDArray[np.int64]
+    cost: Array
+    cost_error: Array
+    danger: Array
+
+
+class Judgement(NamedTuple):
+    """How good a choice is on a sample.
+
+    Attributes:
+        probability: Of detection.
+        low, high: Its Clopper-Pearson limits, 95 %.
+        danger: Share of the danger measured.
+        cost: (11) per pair and node [1/m].
+    """
+
+    probability: float
+    low: float
+    high: float
+    danger: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Placement:
+    """One optimised choice of nodes.
+
+    Attributes:
+        objective: "cost", "detection", "danger", or "probability" for (13).
+        solution: The choice, its value and bound.
+        flattered: Judged on the sample it was optimised for.
+        fair: Judged on the independent sample.
+    """
+
+    objective: str
+    solution: Solution
+    flattered: Judgement
+    fair: Judgement
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything found.
+
+    Attributes:
+        candidates: The nodes.
+        samples: The one optimised for, and the independent one.
+        curves: Of the three objectives.
+        placements: The choices asked for, by objective.
+        wanted: The objective whose choice is the answer.
+    """
+
+    candidates: Candidates
+    samples: tuple[Sample, Sample]
+    curves: dict[str, Curve]
+    placements: dict[str, Placement]
+    wanted: str
+
+    @property
+    def answer(self) -> Placement:
+        """The choice asked for."""
+        return self.placements[self.wanted]
+
+
+def study(
+    candidates: Candidates,
+    samples: tuple[Sample, Sample],
+    objective: Objective,
+    *,
+    spots: int = 20,
+    probability: float | None = None,
+    caps: Caps | None = None,
+    time_limit: float = 30.0,
+    exact: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Study:
+    """Optimise on the first sample, judge on the second.
+
+    Args:
+        candidates: The nodes.
+        samples: The one to optimise for, and an independent one.
+        objective: What the answer is to be best at; ignored if a probability is given.
+        spots: How many there are.
+        probability: Find the fewest spots that reach it instead, eq. (13).
+        caps: How many spots of a kind there may be; ignored by the curves and by (13).
+        time_limit: For each 0-1 programme [s].
+        exact: False: greedy only.
+        progress: Called with the name of what comes next.
+
+    Raises:
+        ConfigurationError: All nodes together do not reach the probability; no spots, or more than nodes.
+    """
+    say = progress or (lambda _: None)
+    first = samples[0]
+    check_spots(spots, first.nodes, caps)
+    say("curves")
+    links, n = candidates.nodes.links, first.nodes
+    worths: dict[str, Worth | None] = {
+        "detection": None,
+        "danger": seen_by_links(first, links, first.danger),
+        "evasion": seen_by_links(first, links, first.torque),
+    }
+    orders = {"cost": cheapest_order(first)}
+    for name, worth in worths.items():
+        orders[name] = greedy(n, first.node, worth or detected_pairs(first)).order
+    curves = {name: _curve(order, samples) for name, order in orders.items()}
+    best = np.sort(cheapest_order(first, caps)[:spots])
+    value = float(first.sums()[best].sum())
+    solutions = {"cost": Solution(best, value, value, "sorting", 0.0)}
+    for name, worth in worths.items():
+        asked = name == objective.value and probability is None
+        say(f"{spots} spots, {name}")
+        solutions[name] = best_choice(first, spots, worth, caps, time_limit=time_limit, exact=exact and asked)
+    if probability is not None:
+        say("least spots")
+        solutions["probability"] = least_spots(first, probability, time_limit=time_limit, exact=exact)
+    placements = {
+        name: Placement(name, found, *(judge(sample, found.chosen) for sample in samples))
+        for name, found in solutions.items()
+    }
+    return Study(candidates, samples, curves, placements, "probability" if probability is not None else objective.value)
+
+
+def _curve(order: NDArray[np.intp], samples: tuple[Sample, Sample]) -> Curve:
+    costs = [cost(sample, order) for sample in samples]
+    counts = [progress_of(s.nodes, s.node, detected_pairs(s), order) for s in samples]
+    danger = [
+        progress_of(s.nodes, s.node, Worth(s.pair.astype(np.int64), s.pairs, s.danger), order) / s.peak.sum()
+        for s in samples
+    ]
+    return Curve(
+        order,
+        np.stack(counts).astype(np.int64),
+        np.stack([value for value, _ in costs]),
+        np.stack([error for _, error in costs]),
+        np.stack(danger),
+    )
+
+
+def judge(sample: Sample, chosen: NDArray[np.intp]) -> Judgement:
+    """How good some nodes are on a sample."""
+    seen = sample.seen_by(chosen)
+    count = int((seen > 0.0).sum())
+    low, high = clopper_pearson(count, sample.pairs)
+    share = float(seen.sum() / sample.peak.sum())
+    return Judgement(count / sample.pairs, float(low), float(high), share, float(cost(sample, chosen)[0][-1]))
+
+
+def to_dict(result: Study) -> dict[str, Any]:
+    """For JSON."""
+    names = result.candidates.nodes.names
+    found: dict[str, Any] = {
+        "nodes": len(names),
+        "spacing": result.candidates.spacing,
+        "pairs": result.samples[0].pairs,
+        "wanted": result.wanted,
+        "detected_by_all_nodes": [judge(s, np.arange(s.nodes)).probability for s in result.samples],
+        "rays": [
+            {
+                "on_robot": s.on_robot / (s.pairs * s.nodes),
+                "too_near": s.too_near / (s.pairs * s.nodes),
+                "detections_per_pair": len(s.node) / s.pairs,
+            }
+            for s in result.samples
+        ],
+        "placements": {},
+        "curves": {},
+    }
+    for key, item in result.placements.items():
+        found["placements"][key] = {
+            "spots": [names[i] for i in item.solution.chosen],
+            "value": item.solution.value,
+            "bound": item.solution.bound,
+            "gap": item.solution.gap,
+            "method": item.solution.method,
+            "seconds": item.solution.seconds,
+            "optimised_sample": item.flattered._asdict(),
+            "independent_sample": item.fair._asdict(),
+        }
+    for key, curve in result.curves.items():
+        low, high = clopper_pearson(curve.counts[1], result.samples[1].pairs)
+        found["curves"][key] = {
+            "order": [names[i] for i in curve.order],
+            "probability": (curve.counts / [[s.pairs] for s in result.samples]).tolist(),
+            "confidence": [low.tolist(), high.tolist()],
+            "cost": curve.cost.tolist(),
+            "cost_error": curve.cost_error.tolist(),
+            "danger": curve.danger.tolist(),
+        }
+    return found

@@ -1,0 +1,64 @@
+"""`qpsafe place`: files, JSON, clear errors, nothing left behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import qpsafe
+from qpsafe.cli.main import app
+from qpsafe.errors import ConfigurationError
+
+QUICK = ["place", "--nodes", "40", "--pairs", "60", "--no-pictures", "--no-exact"]
+
+
+def run(*arguments: str) -> object:
+    return CliRunner().invoke(app, [*QUICK, *arguments])
+
+
+def test_a_placement_is_written_and_loads(tmp_path: Path) -> None:
+    result = run("--spots", "8", "--json", "--out", str(tmp_path / "out"))
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert report == json.loads((tmp_path / "out" / "report.json").read_text())
+    spots = qpsafe.SpotArray.load(tmp_path / "out" / "spots.toml", qpsafe.load_robot("irb140"))
+    assert sorted(spots.names) == sorted(report["placements"]["detection"]["spots"])
+    assert len(spots) == 8
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"spots.toml", "report.json", "figure-9.png"}
+    for curve in report["curves"].values():
+        assert len(curve["probability"][1]) == report["nodes"] + 1
+        low, high = curve["confidence"]
+        assert all(a <= p <= b for a, p, b in zip(low, curve["probability"][1], high, strict=True))
+
+
+def test_fewest_spots_for_a_probability(tmp_path: Path) -> None:
+    result = run("--probability", "0.6", "--json", "--out", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)["placements"]["probability"]
+    assert found["optimised_sample"]["probability"] >= 0.6
+    assert found["bound"] <= len(found["spots"]) == found["value"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--spots", "0"], "spots = 0: expected 1 to 40"),
+        (["--spots", "41"], "spots = 41: expected 1 to 40"),
+        (["--probability", "1.0"], "what all"),
+        (["--probability", "1.5"], "above 0 and at most 1"),
+        (["--probability", "0.5", "--spots", "3"], "a probability decides how many"),
+        (["--pairs", "0"], "pairs = 0"),
+        (["iiwa99"], "iiwa99"),
+    ],
+)
+def test_what_cannot_be_asked_is_said_and_nothing_is_written(
+    arguments: list[str], message: str, tmp_path: Path
+) -> None:
+    result = run(*arguments, "--out", str(tmp_path / "out"))
+    assert result.exit_code != 0
+    assert isinstance(result.exception, ConfigurationError)
+    assert message in str(result.exception)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,166 @@
+"""Candidate nodes: on the surface, equally spaced, outward, free; the wanted number; meshes; clear errors."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import qpsafe
+from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.placement.candidates import Candidates, candidate_nodes, node_pose
+from qpsafe.placement.grid import NEAREST, lattice, thin_out
+from qpsafe.placement.spots_toml import spots_toml
+from qpsafe.placement.surface import link_surface
+from qpsafe.robot.robot import Robot
+
+ROBOT = qpsafe.load_robot("irb140")
+
+
+@pytest.fixture(scope="module")
+def nodes() -> Candidates:
+    return candidate_nodes(ROBOT)
+
+
+def test_the_irb140_has_as_many_nodes_as_the_source(nodes: Candidates) -> None:
+    assert len(nodes) == 254
+    assert len(set(nodes.nodes.names)) == 254
+    nodes.nodes.check(ROBOT)
+
+
+def test_nodes_lie_in_their_box_and_on_the_surface(nodes: Candidates) -> None:
+    for i, region in enumerate(ROBOT.regions):
+        mine = nodes.region == i
+        points, normals = nodes.nodes.positions[mine], nodes.nodes.directions[mine]
+        assert (points >= region.lower - 1e-8).all()
+        assert (points <= region.upper + 1e-8).all()
+        assert (nodes.nodes.links[mine] == region.link).all()
+        surface = link_surface(ROBOT, region)
+        faces = surface.normals()
+        for point, normal in zip(points, normals, strict=True):
+            height = np.abs(((point - surface.skin[:, 0]) * faces).sum(axis=1))
+            assert height[(faces @ normal) > 1.0 - 1e-9].min() < 1e-7  # in the plane of a triangle with this normal
+
+
+def test_nodes_are_no_nearer_to_each_other_than_the_spacing_allows(nodes: Candidates) -> None:
+    for i in range(len(ROBOT.regions)):
+        points, normals = nodes.nodes.positions[nodes.region == i], nodes.nodes.directions[nodes.region == i]
+        gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
+        same_way = (normals @ normals.T > 1e-6) & ~np.eye(len(points), dtype=bool)
+        assert gaps[same_way].min(initial=1.0) >= NEAREST * nodes.spacing - 1e-12
+
+
+def test_directions_point_out_of_the_body(nodes: Candidates) -> None:
+    """1 mm off the surface a node is in no hull of the body, 2 mm below it is in one."""
+    from qpsafe.sensing.body import body_hull_set
+
+    hulls = body_hull_set(ROBOT)
+    state = ROBOT.at(ROBOT.home)
+    origins, directions = nodes.nodes.rays(state)
+    bodies, _ = nodes.nodes.mounting(ROBOT)
+    zero = np.zeros(1)
+    for origin, direction, body in zip(origins, directions, bodies, strict=True):
+        own = hulls.take(np.flatnonzero(hulls.bodies == body).tolist())
+        assert own.find((origin + 0.001 * direction)[None], zero, state.body_poses())[0] < 0
+        assert own.find((origin - 0.002 * direction)[None], zero, state.body_poses())[0] >= 0
+
+
+def test_a_flat_square_is_a_square_lattice() -> None:
+    square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)
+    up = np.array([[0.0, 0.0, 1.0]] * 2)
+    points, normals = lattice(square, up, np.array([[0.0, 0, -1], [1, 1, 1]]), 0.25)
+    kept = thin_out(points, normals, 0.95 * 0.25)
+    expected = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 2), -1).reshape(-1, 2)
+    assert len(kept) == 25
+    assert {tuple(p) for p in points[kept, :2].round(12)} == {tuple(p) for p in expected.round(12)}
+    assert (normals[kept] == up[0]).all()
+
+
+def test_the_constant_matrix_of_7_measures_along_its_z_axis() -> None:
+    rng = np.random.default_rng(0)
+    for normal in rng.normal(size=(20, 3)):
+        n, p = normal / np.linalg.norm(normal), rng.normal(size=3)
+        T = node_pose(p, n)
+        assert np.linalg.inv(T) @ np.append(p + 0.3 * n, 1.0) == pytest.approx([0, 0, 0.3, 1], abs=1e-12)
+        assert T[:3, :3] @ T[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+
+
+def test_a_placement_written_is_what_the_controller_loads(nodes: Candidates, tmp_path: Path) -> None:
+    chosen = [3, 70, 120, 200, 250]
+    path = tmp_path / "spots.toml"
+    path.write_text(spots_toml(nodes, chosen, "a test"), encoding="utf-8")
+    spots = qpsafe.SpotArray.load(path, ROBOT)
+    assert spots.names == tuple(nodes.nodes.names[i] for i in chosen)
+    assert spots.frames == tuple(nodes.nodes.frames[i] for i in chosen)
+    assert (spots.links == nodes.nodes.links[chosen]).all()
+    assert spots.positions == pytest.approx(nodes.nodes.positions[chosen], abs=6e-6)
+    assert spots.directions == pytest.approx(nodes.nodes.directions[chosen], abs=1e-6)
+    assert spots.range_max == pytest.approx(0.8)
+    assert spots.field_of_view == pytest.approx(np.deg2rad(6.0))
+
+
+def with_regions(folder: Path, text: str) -> Robot:
+    """A copy of the robot with other regions."""
+    shutil.copytree(ROBOT.folder, folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"), dirs_exist_ok=True)
+    file = folder / "robot.toml"
+    head = file.read_text(encoding="utf-8").partition("[[regions]]")[0]
+    file.write_text(head + text, encoding="utf-8")
+    return qpsafe.load_robot(folder)
+
+
+BOX = "lower = [-0.44, -0.14, -0.18]\nupper = [0.09, 0.10, -0.06]\n"
+
+
+def test_a_mesh_of_the_users_own(tmp_path: Path) -> None:
+    """A cube of trimesh's instead of the model's geometry: 6 faces of 3 x 3 points."""
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.4, 0.4, 0.4)).export(tmp_path / "cube.stl")
+    box = "lower = [-1.0, -1.0, -1.0]\nupper = [1.0, 1.0, 1.0]\nself_sight = 1.0\n"
+    robot = with_regions(tmp_path, f'[[regions]]\nname = "cube"\nlink = 6\nmesh = "cube.stl"\n{box}')
+    found = candidate_nodes(robot, spacing=0.2)
+    assert np.abs(found.nodes.positions).max(axis=1) == pytest.approx(0.2)
+    by_side = found.nodes.positions / 0.2 @ np.vstack((np.eye(3), -np.eye(3))).T
+    faces = {tuple(d) for d in found.nodes.directions.round(9) + 0.0}
+    assert len(faces) == len(by_side[0]) or len(faces) <= 6
+    for direction, point in zip(found.nodes.directions, found.nodes.positions, strict=True):
+        assert direction @ point == pytest.approx(0.2)
+
+
+MISTAKES = {
+    "link": ('name = "a"\nlink = 7\n' + BOX, "regions[0].link"),
+    "frame": ('name = "a"\nlink = 2\nframe = "dh9"\n' + BOX, "regions[0].frame"),
+    "box": ('name = "a"\nlink = 2\nlower = [0.1, 0, 0]\nupper = [0, 1, 1]\n', "regions[0].lower"),
+    "mesh": ('name = "a"\nlink = 2\nmesh = "none.stl"\n' + BOX, "regions[0].mesh"),
+    "name": (f'name = "a"\nlink = 2\n{BOX}[[regions]]\nname = "a"\nlink = 2\n{BOX}', "regions[1].name"),
+    "at_most": ('name = "a"\nlink = 2\nat_most = -1\n' + BOX, "regions[0].at_most"),
+    "key": ('name = "a"\nlink = 2\ncolour = 1\n' + BOX, "regions[0].colour"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_region_names_file_key_and_value(mistake: str, tmp_path: Path) -> None:
+    text, key = MISTAKES[mistake]
+    with pytest.raises(RobotFileError) as caught:
+        with_regions(tmp_path, "[[regions]]\n" + text)
+    assert caught.value.key == key
+    assert caught.value.where == str(tmp_path / "robot.toml")
+
+
+def test_a_robot_without_a_region(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match=r"regions = None: expected at least one \[\[regions\]\]"):
+        candidate_nodes(with_regions(tmp_path, ""))
+
+
+def test_a_box_beside_the_robot(tmp_path: Path) -> None:
+    text = '[[regions]]\nname = "air"\nlink = 2\nlower = [5.0, 5.0, 5.0]\nupper = [6.0, 6.0, 6.0]\n'
+    with pytest.raises(RobotFileError, match=r"regions \(air\)"):
+        candidate_nodes(with_regions(tmp_path, text))
+
+
+@pytest.mark.parametrize("wanted", [0, -3])
+def test_no_nodes_are_wanted(wanted: int) -> None:
+    with pytest.raises(ConfigurationError, match="nodes >= 1"):
+        candidate_nodes(ROBOT, wanted)
