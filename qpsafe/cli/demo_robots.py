@@ -58,8 +58,8 @@ def show_robots(rows: list[RobotRow], screen: Console) -> None:
     from rich.table import Table
 
     table = Table(title="First experiment on every bundled robot")
-    table.add_column("robot")
-    for heading in ("joints", "links", "in order", "peak CDF", "limits", "gained, mm", "kept"):
+    table.add_column("robot", no_wrap=True)
+    for heading in ("joints", "links", "order", "peak CDF", "limits", "gained, mm", "kept"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         good, of = row.in_order
