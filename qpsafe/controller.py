@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from operator import is_not
 from typing import TYPE_CHECKING, Any
@@ -55,6 +55,7 @@ class SafetyController:
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
+        carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
         barrier: A cap on the danger field, beyond the source; none by default.
         recovery: How the robot returns to its path after danger.
 
@@ -76,6 +77,7 @@ class SafetyController:
         spots: SpotArray | None = None,
         sensing: SensingRules | None = None,
         known: Sequence[Obstacle] = (),
+        carried: Mapping[str, Sequence[Obstacle]] | None = None,
         barrier: DangerBarrier | None = None,
         recovery: RecoveryRules | None = None,
     ) -> None:
@@ -93,7 +95,7 @@ class SafetyController:
         self._brake_limits = self.limits or own
         self.spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
         self.rules = SensingRules() if sensing is None else sensing
-        self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known) if self.spots else None
+        self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known, carried) if self.spots else None
         self.barrier = barrier
         self.recovery_rules = RecoveryRules() if recovery is None else recovery
         self._quick: Resolver | None = None

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
-from qpsafe.sim.cell import Parts
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sim.cell import Parts, Screw
 from qpsafe.sim.gripper import Gripper
 from qpsafe.sim.handwork import Handwork
 from qpsafe.sim.known import known_obstacles
@@ -23,6 +24,12 @@ from qpsafe.tasks.position import PositionTask
 if TYPE_CHECKING:
     from qpsafe.sim.pick_place import PickPlaceExperiment
 
+#: A screw in the gripper: its head's top at the tip, its shank ahead.
+SCREW = Obstacle.box(
+    "screw",
+    (2.0 * Screw.HEAD_RADIUS, 2.0 * Screw.HEAD_RADIUS, Screw.HEAD + Screw.SHANK),
+    (0.0, 0.0, 0.5 * (Screw.HEAD + Screw.SHANK)),
+)
 GRIP, RELEASE = "grip", "release"  # events of the program
 AT_REST = 1.5  # people who wait stand still from so long after they came to until as long before they go [s]
 SETTLED = 0.02  # a screw slower than this rests [m/s]
@@ -63,6 +70,7 @@ class PickLoop:
             experiment.law,
             sensing=experiment.rules,
             known=known_obstacles(scene),
+            carried={"tcp": [SCREW]},  # the gripper may hold one
             recovery=experiment.recovery,
         )
         spots = self.controller.spots

@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import RobotFileError
-from qpsafe.sensing.hulls import HullSet
+from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.sensing.hulls import HullSet, Obstacle
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -38,6 +38,21 @@ def body_hull_set(robot: Robot) -> HullSet:
     if robot not in _sets:
         _sets[robot] = HullSet(body_hulls(robot))
     return _sets[robot]
+
+
+def fixed_to(robot: Robot, frame: str, thing: Obstacle) -> BodyHull:
+    """A thing that moves with a frame of the robot, given in the frame's axes, e.g. a workpiece in its gripper.
+
+    Raises:
+        ConfigurationError: The robot has no such frame, or the thing is no obstacle.
+    """
+    if frame not in robot.frame_names:
+        raise ConfigurationError("SafetyController", "carried", frame, "one of " + ", ".join(robot.frame_names))
+    if not isinstance(thing, Obstacle):
+        raise ConfigurationError("SafetyController", f"carried[{frame!r}]", thing, "an Obstacle, e.g. Obstacle.box")
+    found = robot.model.frames[robot.frame_id(frame)]
+    placement = found.placement.homogeneous
+    return int(found.parentJoint), thing.name, thing.vertices @ placement[:3, :3].T + placement[:3, 3]
 
 
 def _load(robot: Robot) -> tuple[BodyHull, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sensing.body import body_hull_set
+from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import HullSet, Obstacle
@@ -55,6 +55,7 @@ class DistanceSensing:
         dt: Tick [s].
         rules: What counts, and what a sick sensor does.
         known: Known obstacles of the surroundings.
+        carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
 
     Raises:
         ConfigurationError: The spots do not fit the robot, or an obstacle is none.
@@ -68,6 +69,7 @@ class DistanceSensing:
         dt: float,
         rules: SensingRules | None = None,
         known: Sequence[Obstacle] = (),
+        carried: Mapping[str, Sequence[Obstacle]] | None = None,
     ) -> None:
         self.rules = rules = SensingRules() if rules is None else rules
         if not isinstance(rules, SensingRules):
@@ -81,6 +83,8 @@ class DistanceSensing:
         hulls = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
         if rules.self_detection:
             hulls = hulls + body_hull_set(robot)
+        for frame, things in ({} if carried is None else carried).items():
+            hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
         count = len(spots)
         self.health = SpotHealth(count, rules, dt)
         self._hold = PointHold(count, rules, dt)

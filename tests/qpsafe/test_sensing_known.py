@@ -1,5 +1,6 @@
 """What does not count: known obstacles and the robot itself; and what counts all the same."""
 
+from itertools import product
 from typing import Any
 
 import coal
@@ -169,3 +170,30 @@ def test_the_robot_itself_does_not_count_and_what_is_before_it_does(irb140: Any)
         if found > 8:
             break
     assert found > 8
+
+
+def test_what_a_tool_carries_is_part_of_the_robot() -> None:
+    """A spot that looks at a workpiece in the gripper sees danger, unless it has been told of it; it moves along."""
+    robot = qpsafe.load_robot("irb140")
+    spots = qpsafe.load_spots(robot)
+    assert spots is not None
+    for q, spot in product((robot.home, robot.home + 0.3), range(len(spots))):
+        state = robot.at(q)
+        tip, (origins, axes) = state.pose("tcp"), spots.rays(state)
+        distances = np.full(len(spots), np.inf)
+        distances[spot] = 0.4
+        seen = origins[spot] + 0.4 * axes[spot]
+        thing = Obstacle.box("part", (0.1, 0.1, 0.1), tip[:3, :3].T @ (seen - tip[:3, 3]))
+        counts = []
+        for carried in (None, {"tcp": [thing]}):
+            sensing = DistanceSensing(robot, spots, 0.004, carried=carried)
+            counts.append(len(sensing.update(state, state.wire(REST), distances).points))
+        assert counts == [1, 0]
+
+
+@pytest.mark.parametrize("carried", [{"hand": [Obstacle.box("part", (0.1, 0.1, 0.1))]}, {"tcp": ["part"]}])
+def test_what_cannot_be_carried_is_refused(carried: Any) -> None:
+    robot = qpsafe.load_robot("irb140")
+    task = qpsafe.PositionTask("tcp", qpsafe.FixedPose(robot.pose("tcp", robot.home)))
+    with pytest.raises(qpsafe.ConfigurationError, match="carried"):
+        qpsafe.SafetyController(robot, [task], carried=carried)
