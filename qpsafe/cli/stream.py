@@ -89,7 +89,8 @@ def stream(
     from qpsafe.irc5.loop import LoopRules, StreamLoop
     from qpsafe.irc5.reference_log import ReferenceWriter
     from qpsafe.irc5.rules import SessionRules
-    from qpsafe.irc5.run import Requests, TimedStreamer, run_stream
+    from qpsafe.irc5.run import Requests, run_stream
+    from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.warm_up import session_limits, warm_up
     from qpsafe.irc5.watchdog import Watchdog
     from qpsafe.supervisor import Supervisor
@@ -107,7 +108,7 @@ def stream(
             stack.callback(inlet.close)
         names = controller.robot.joint_names
         rules = SessionRules(ramp_in=ramp_in, ramp_out=ramp_out)
-        streamer = TimedStreamer(session_limits(controller), host, port, rules, peer, names)
+        streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names)
         stack.callback(streamer.close)
         warm_up(controller, blind)
         if requests.leave:

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.loop import StreamLoop
     from qpsafe.irc5.realtime import Grant
-    from qpsafe.irc5.run import StreamRun, TimedStreamer
+    from qpsafe.irc5.run import StreamRun
+    from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.watchdog import Watchdog
     from qpsafe.supervisor import Transition
 
@@ -36,7 +37,7 @@ def status_line(run: StreamRun, loop: StreamLoop) -> None:
 def result_of(
     run: StreamRun,
     loop: StreamLoop,
-    streamer: TimedStreamer,
+    streamer: EgmStreamer,
     inlet: SensorInput | None,
     dog: Watchdog | None,
     grants: list[Grant],

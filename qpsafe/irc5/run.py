@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import signal
-import socket
-import struct
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,61 +13,14 @@ from typing import Any
 from qpsafe.irc5.distances import SensorInput
 from qpsafe.irc5.latency import Latency
 from qpsafe.irc5.loop import StreamLoop
-from qpsafe.irc5.messages import MAX_SIZE
 from qpsafe.irc5.realtime import resident
-from qpsafe.irc5.streamer import MOST_AT_ONCE, EgmStreamer
+from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.watchdog import Watchdog
 from qpsafe.supervisor import State, StopCategory
 from qpsafe.tick import Tick
 
-_STAMP = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux: when the kernel received a datagram, on the real-time clock
-_TIMESPEC = struct.Struct("@ll")
 WAIT = 0.02  # longest time between two heartbeats [s]
 STEADY = 5.0  # memory is compared from this time of the stream on [s]
-
-
-class TimedStreamer(EgmStreamer):
-    """A streamer that knows when the packets it answers arrived at this computer, waiting in the kernel included.
-
-    Attributes:
-        arrived: Of the oldest packet since the last answer, on the real-time clock [ns]; 0 without one. The newest is
-            answered, but a delay in which several came must show in full.
-        stamped: Whether the kernel says so; else it is when the packet was read.
-    """
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.arrived = 0
-        self.stamped = sys.platform == "linux"
-        if self.stamped:
-            self._socket.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
-
-    def _drain(self) -> None:
-        now = time.monotonic()
-        for _ in range(MOST_AT_ONCE):
-            try:
-                data, notes, _, sender = self._socket.recvmsg(MAX_SIZE + 1, 64)
-            except BlockingIOError:
-                return
-            except OSError:  # an earlier answer found nobody
-                self.counts["not_received"] += 1
-                continue
-            if self.session.offer(data, sender, now) and self.arrived == 0:
-                self.arrived = _stamp(notes) or time.time_ns()
-
-    def since_arrival(self) -> float:
-        """How long ago the oldest packet since the last call arrived [s]."""
-        arrived, self.arrived = self.arrived, 0
-        return 1e-9 * (time.time_ns() - arrived)
-
-
-def _stamp(notes: list[tuple[int, int, bytes]]) -> int:
-    """The kernel's time of arrival [ns], 0 without."""
-    for level, kind, data in notes:
-        if level == socket.SOL_SOCKET and kind == _STAMP and len(data) >= _TIMESPEC.size:
-            seconds, nanos = _TIMESPEC.unpack_from(data)
-            return seconds * 1_000_000_000 + nanos
-    return 0
 
 
 @dataclass
@@ -127,7 +77,7 @@ class Requests:
 
 
 def run_stream(
-    streamer: TimedStreamer,
+    streamer: EgmStreamer,
     loop: StreamLoop,
     *,
     sensors: SensorInput | None = None,
@@ -182,7 +132,7 @@ def run_stream(
             if loop.events and on_events is not None:
                 on_events(loop.take_events())
             streamer.answer(reference)
-            run.latency.record(streamer.since_arrival())
+            run.latency.record(streamer.response)
             if not began:
                 began, first, last = True, now, now
             run.duration = now - first
@@ -206,7 +156,7 @@ def run_stream(
     return run
 
 
-def _last_resort(streamer: TimedStreamer, loop: StreamLoop) -> bool:
+def _last_resort(streamer: EgmStreamer, loop: StreamLoop) -> bool:
     """The session brakes by itself; if even that fails, silence (category 0)."""
     try:
         return streamer.finish()

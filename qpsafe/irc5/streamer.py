@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.arrival import ask_for_times, receive
 from qpsafe.irc5.messages import DEFAULT_PORT, MAX_SIZE
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
@@ -47,6 +48,9 @@ class EgmStreamer:
     Attributes:
         session: What decides; its phase, causes and counts.
         address: Address and port it listens at.
+        stamped: Whether the kernel says when packets arrived; else it is when they were read.
+        response: Of the last answer, from the arrival of the oldest packet since the one before to its leaving [s].
+            The newest is answered, but a delay in which several came must show in full.
 
     Raises:
         ConfigurationError: The host is unknown here, or stands for all interfaces; the port is no port, or is taken.
@@ -76,6 +80,9 @@ class EgmStreamer:
             raise
         self._socket.setblocking(False)
         self.address: tuple[str, int] = self._socket.getsockname()
+        self.stamped = ask_for_times(self._socket)
+        self.response = 0.0
+        self._arrived = 0  # real-time clock, of the oldest packet since the last answer [ns]; 0 without one
 
     @property
     def counts(self) -> Counter[str]:
@@ -115,6 +122,9 @@ class EgmStreamer:
         except OSError:
             self.counts["not_sent"] += 1
             return False
+        finally:
+            arrived, self._arrived = self._arrived, 0
+            self.response = 1e-9 * (time.time_ns() - arrived)
         return True
 
     def stop(self, cause: str) -> None:
@@ -161,13 +171,14 @@ class EgmStreamer:
         now = time.monotonic()
         for _ in range(MOST_AT_ONCE):
             try:
-                data, sender = self._socket.recvfrom(MAX_SIZE + 1)  # what fills it is too long
+                data, sender, arrived = receive(self._socket, MAX_SIZE + 1)  # what fills it is too long
             except BlockingIOError:
                 return
             except OSError:  # an earlier answer found nobody
                 self.counts["not_received"] += 1
                 continue
-            self.session.offer(data, sender, now)
+            if self.session.offer(data, sender, now) and self._arrived == 0:
+                self._arrived = arrived
 
 
 def interface_address(host: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -83,6 +84,24 @@ def test_each_packet_is_answered_once(streamer: EgmStreamer, client: Client) -> 
     assert client.silent()
     assert streamer.wait(0.0) is None
     assert streamer.counts["answered"] == streamer.counts["accepted"] == 50
+
+
+def test_a_response_is_counted_from_the_oldest_packets_arrival(streamer: EgmStreamer, client: Client) -> None:
+    """Waiting in the kernel before it was read is part of it, and what a newer packet superseded still waited."""
+    if not streamer.stamped:
+        pytest.skip("this kernel does not say when datagrams arrived")
+    for packets in (2, 1):
+        before = time.time_ns()
+        client.say()
+        said = time.time_ns()
+        for _ in range(packets - 1):
+            time.sleep(0.02)
+            client.say()
+        assert streamer.wait(5.0) is not None
+        ready = time.time_ns()
+        assert streamer.answer(None)
+        after = time.time_ns()
+        assert 1e-9 * (ready - said) <= streamer.response <= 1e-9 * (after - before)
 
 
 def test_the_newest_of_many_is_answered_and_junk_is_passed_over(streamer: EgmStreamer, client: Client) -> None:
