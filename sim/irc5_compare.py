@@ -10,8 +10,10 @@ import signal
 import subprocess
 import sys
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +27,7 @@ from qpsafe.sim.irc5_loop import Exchange, Irc5Loop
 from qpsafe.sim.irc5_motion import EgmSettings
 from qpsafe.sim.irc5_process import RobotRun, run_robot
 from qpsafe.sim.irc5_udp import UdpExchange
+from qpsafe.sim.pick_loop import PickLoop
 
 Array = NDArray[np.float64]
 
@@ -98,20 +101,54 @@ def _communicate(process: subprocess.Popen[str]) -> tuple[str, None]:
     return output, None
 
 
-def in_one_process(name: str, robot: Robot, duration: float, settings: EgmSettings, delay: int = 0) -> Array:
-    """Measured joint positions of an experiment with session and controller in this process (N, n) [rad].
+class Course(NamedTuple):
+    """How an experiment went.
+
+    Attributes:
+        q: Measured joint positions, every cycle from the first answer (N, n) [rad].
+        deeds: How often what happened to a screw, by its kind, see `PickEvent`; empty without screws.
+        parts: How many screws are where at the end.
+    """
+
+    q: Array
+    deeds: Counter[str]
+    parts: Counter[str]
+
+
+def _course(run: Irc5Loop, q: list[Array]) -> Course:
+    loop = run.loop
+    if not isinstance(loop, PickLoop):
+        return Course(np.array(q), Counter(), Counter())
+    return Course(np.array(q), Counter(event.kind for event in loop.events), Counter(loop.whereabouts()))
+
+
+def _over(run: Irc5Loop, cycles: int) -> bool:
+    return cycles > 0 and isinstance(run.loop, PickLoop) and run.loop.done(cycles)
+
+
+def in_one_process(
+    name: str, robot: Robot, duration: float, settings: EgmSettings, delay: int = 0, cycles: int = 0
+) -> Course:
+    """An experiment with session and controller in this process.
 
     Args:
         name: Of the experiment.
         robot: The robot.
-        duration: [s].
+        duration: At most [s].
         settings: Of EGM.
         delay: Cycles that an answer is under way: 0 as in lock-step, 1 as on a wire without delays of its own.
+        cycles: Of the third experiment: end when so many screws have been carried; 0: at the duration.
     """
     loop, _ = experiment_loop(name, robot)
     exchange: Exchange = Here(loop.controller) if delay == 0 else _Late(Here(loop.controller), delay)
     run = Irc5Loop(experiment_loop(name, robot)[0], exchange, settings)
-    return np.array(_cycles(run, duration))
+    found: list[Array] = []
+    while len(found) < round(duration / run.irc5.dt) and not _over(run, cycles):
+        run.step()
+        if run.running:
+            found.append(run.plant.q)
+        run.advance()
+    return _course(run, found)
 
 
 class _Late:
@@ -126,27 +163,18 @@ class _Late:
         return self._late.pop(0)
 
 
-def _cycles(run: Irc5Loop, duration: float) -> list[Array]:
-    found: list[Array] = []
-    while len(found) < round(duration / run.irc5.dt):
-        run.step()
-        if run.running:
-            found.append(run.plant.q)
-        run.advance()
-    return found
-
-
 def over_the_wire(
-    name: str, robot: Robot, duration: float, settings: EgmSettings, *options: str, lockstep: bool
-) -> tuple[Array, RobotRun, dict[str, Any]]:
-    """The same with `qpsafe stream` in a process of its own: positions, what the robot saw, the stream's report."""
+    name: str, robot: Robot, duration: float, settings: EgmSettings, *options: str, lockstep: bool, cycles: int = 0
+) -> tuple[Course, RobotRun, dict[str, Any]]:
+    """The same with `qpsafe stream` in a process of its own: its course, what the robot saw, the stream's report."""
     with contextlib.closing(UdpExchange(robot.nq, None, lockstep=5.0 if lockstep else 0.0)) as exchange:
         events = "{}:{}".format(*exchange.events)
         with stream_process("--experiment", name, "--events", events, *options) as stream:
             exchange.aim(stream.addresses["the robot"], stream.addresses["distances"])
             run = Irc5Loop(experiment_loop(name, robot)[0], exchange, settings)
-            seen = run_robot(run, exchange, duration, lockstep=lockstep, keep=True)
-    return np.array(seen.q[: round(duration / 0.004)]), seen, stream.report
+            over = partial(_over, run, cycles)
+            seen = run_robot(run, exchange, duration, lockstep=lockstep, keep=True, over=over)
+    return _course(run, seen.q[: round(duration / run.irc5.dt)]), seen, stream.report
 
 
 class Agreement(NamedTuple):

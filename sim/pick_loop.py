@@ -32,6 +32,7 @@ SCREW = Obstacle.box(
 )
 GRIP, RELEASE = "grip", "release"  # events of the program
 AT_REST = 1.5  # people who wait stand still from so long after they came to until as long before they go [s]
+SETTLE = 1.0  # a run goes on for this long after its last release, so that the last screw comes to rest [s]
 SETTLED = 0.02  # a screw slower than this rests [m/s]
 
 
@@ -115,6 +116,11 @@ class PickLoop:
                     self.falling.discard(screw)
                     kind = "delivered" if self.cell.in_box(places[screw : screw + 1])[0] else "lost"
                     self.events.append(PickEvent(self.k, kind, screw))
+
+    def done(self, cycles: int, settle: float = SETTLE) -> bool:
+        """Whether so many screws have been let go, the last one `settle` ago [s]."""
+        ticks = [event.tick for event in self.events if event.kind in (RELEASE, "empty")]
+        return len(ticks) >= cycles and (self.k - ticks[cycles - 1]) * self.controller.dt >= settle
 
     def _pose(self, number: int, time: float) -> PersonPose:
         """A person at a time [s]; computed once while he or she waits."""

@@ -17,7 +17,7 @@ from qpsafe.sim.clearance import Furniture
 from qpsafe.sim.distance import person_distance
 from qpsafe.sim.fixed import Observer, euler_error, pose_error
 from qpsafe.sim.log import Recorder, RunLog
-from qpsafe.sim.pick_loop import RELEASE, PickEvent, PickLoop, motion
+from qpsafe.sim.pick_loop import RELEASE, SETTLE, PickEvent, PickLoop, motion
 from qpsafe.sim.pick_people import load_people
 from qpsafe.sim.scene import Scene, build_scene
 from qpsafe.tasks.program import Program
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 #: The bundled people.
 PEOPLE = Path(__file__).with_name("pick_people.toml")
-SETTLE = 1.0  # a run goes on for this long after its last release, so that the last screw comes to rest [s]
 STATES = 10  # ticks between two states that are kept for pictures
 
 

@@ -36,19 +36,19 @@ def test_over_the_wire_as_in_one_process(tmp_path: Path) -> None:
     log = tmp_path / "references.qpref"
     wire, seen, report = over_the_wire("path", robot, 2.0, settings, "--log", str(log), lockstep=True)
     here = in_one_process("path", robot, 2.0, settings)
-    found = agreement(wire, here)
+    found = agreement(wire.q, here.q)
     assert found.moved > 0.01
     assert found.largest == 0.0
-    assert (seen.counts["answered"], seen.counts["missed"], seen.rejected) == (len(wire), 0, 0)
+    assert (seen.counts["answered"], seen.counts["missed"], seen.rejected) == (len(wire.q), 0, 0)
     # and the stream's own account of it
     assert report["good"] is True
     assert report["state"] == "stopped"
     assert report["stop_category"] == 1
-    assert report["answered"] >= len(wire)
-    assert report["sensors"]["used"] >= len(wire)
+    assert report["answered"] >= len(wire.q)
+    assert report["sensors"]["used"] >= len(wire.q)
     assert report["response"]["count"] == report["answered"]
     references = read_references(log).references
-    assert len(references) > 0.5 * len(wire)
+    assert len(references) > 0.5 * len(wire.q)
     steps = np.diff([reference.q for reference in references], axis=0)
     assert (np.abs(steps) <= robot.max_velocity * 0.004 * (1 + 1e-9)).all()
 
@@ -61,7 +61,11 @@ def test_the_third_experiment_grips_over_the_wire() -> None:
     assert [name for _, name in seen.events] == ["grip"]
     assert seen.counts["missed"] == 0
     assert report["good"] is True
-    assert agreement(wire, in_one_process("pick-and-place", robot, 4.0, settings)).largest == 0.0
+    here = in_one_process("pick-and-place", robot, 4.0, settings)
+    assert agreement(wire.q, here.q).largest == 0.0
+    assert wire.deeds == here.deeds
+    assert wire.parts == here.parts
+    assert wire.parts["gripper"] == 1
 
 
 @pytest.mark.slow
