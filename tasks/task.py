@@ -38,7 +38,7 @@ class Task(ABC):
         gain: K [1/s]; 0 < K dt < 1 for a stable discrete loop.
 
     Raises:
-        ConfigurationError: The gain is not a positive finite number.
+        ConfigurationError: The gain is not a positive finite number, or the trajectory is none.
     """
 
     #: Name shown in reports.
@@ -51,6 +51,9 @@ class Task(ABC):
     def __init__(self, trajectory: Trajectory, gain: float) -> None:
         if not (math.isfinite(gain) and gain > 0.0):
             raise ConfigurationError(type(self).__name__, "gain", gain, "a finite number > 0 [1/s]")
+        if isinstance(trajectory, type) or not callable(getattr(trajectory, "sample", None)):
+            expected = "a Trajectory, i.e. something with sample(t), e.g. FixedPose(pose)"
+            raise ConfigurationError(type(self).__name__, "trajectory", trajectory, expected)
         self.trajectory = trajectory
         self.gain = float(gain)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -10,7 +11,10 @@ from zlib import crc32
 
 import numba
 import numpy as np
+from llvmlite import binding as llvm
 from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
@@ -25,11 +29,11 @@ inline = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
 
-def entry(signature: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile for one signature at import, from numba's cache where this machine has a place for one.
 
     Args:
-        signature: Types of arguments and result.
+        types_: Types of arguments and result.
         uses: Other modules whose compiled code goes into this one. numba's cache notices changes of the entry's own
             file only; so the name it is kept under tells the state of these.
     """
@@ -38,11 +42,38 @@ def entry(signature: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], C
         if uses:
             function.__qualname__ += f"_{checksum(*uses):08x}"
         try:
-            return numba.njit(signature, cache=True, no_cfunc_wrapper=True, **OPTIONS)(function)
+            return numba.njit(types_, cache=True, no_cfunc_wrapper=True, **OPTIONS)(function)
         except RuntimeError:  # no directory that numba may write to
-            return numba.njit(signature, no_cfunc_wrapper=True, **OPTIONS)(function)
+            return numba.njit(types_, no_cfunc_wrapper=True, **OPTIONS)(function)
 
     return compiled
+
+
+def linked(compiled: Any, name: str) -> Callable[..., Any]:
+    """What `entry` compiled, for other compiled code: called at its address, not compiled into the caller once more.
+
+    numba itself would link and optimise the callee's code again in every caller, which takes as long as compiling it.
+
+    Args:
+        compiled: A compiled function of one signature.
+        name: A name that changes with its code: callers in the cache ask for the code under this name.
+    """
+    (result,) = compiled.overloads.values()
+    own = result.signature
+    llvm.add_symbol(name, result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+
+    def call(typing_context: Any, *given: Any) -> Any:
+        def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
+            convention = context.call_conv
+            declared = convention.get_function_type(own.return_type, own.args)
+            function = cgutils.get_or_insert_function(builder.module, declared, name)
+            return convention.call_function(builder, function, own.return_type, own.args, values)[1]
+
+        return own, generate
+
+    context = Parameter("typing_context", Parameter.POSITIONAL_OR_KEYWORD)
+    call.__signature__ = Signature([context, *signature(compiled.py_func).parameters.values()])  # type: ignore[attr-defined]
+    return intrinsic(call)
 
 
 def checksum(*modules: ModuleType) -> int:

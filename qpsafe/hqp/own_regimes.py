@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_linear import jit
-from qpsafe.hqp.own_solver import solve
+from qpsafe.hqp.own_solver import solve_compiled as solve
 from qpsafe.hqp.own_state import floats_of, workspace
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import checksum
+from qpsafe.danger.compiled import checksum, linked
 from qpsafe.hqp import own_damping, own_hierarchy, own_level, own_linear, own_rules, own_state
 from qpsafe.hqp.own_hierarchy import HEADER, run
 from qpsafe.hqp.own_state import workspace
@@ -48,7 +48,9 @@ def _compile(key: int) -> Callable[..., None]:
         if key >= 0:
             run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping)
 
-    notice = Timer(1.5, print, ["qpsafe: compiling the solver, once, takes about 10 s ..."], {"file": sys.stderr})
+    notice = Timer(
+        1.5, print, ["qpsafe: compiling for this machine, once, takes up to half a minute ..."], {"file": sys.stderr}
+    )
     notice.daemon = True
     notice.start()
     try:
@@ -61,6 +63,8 @@ def _compile(key: int) -> Callable[..., None]:
 
 SOURCES = checksum(*MODULES)
 solve = _compile(SOURCES)
+solve_compiled = linked(solve, f"qpsafe_own_solver_{SOURCES:08x}")
+"""`solve` for compiled code."""
 _NO_WEIGHTS = np.empty(0)
 _memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}
 

@@ -180,3 +180,13 @@ def test_home_outside_own_limits_does_not_move_before_there_is_data(irb140: Any)
         tick = controller.step(None, None, None)  # type: ignore[arg-type]
         assert not tick.reference.active
         assert np.array_equal(tick.reference.q, irb140.home)
+
+
+@pytest.mark.parametrize("kind", [qpsafe.PositionTask, qpsafe.OrientationTask, qpsafe.FrameTask])
+@pytest.mark.parametrize("trajectory", [np.eye(4), None, "line", qpsafe.FixedPose])
+def test_a_trajectory_that_cannot_be_sampled_is_refused_by_its_task(kind: Any, trajectory: Any) -> None:
+    with pytest.raises(qpsafe.ConfigurationError) as info:
+        kind("tcp", trajectory)
+    assert kind.__name__ in str(info.value)
+    assert "trajectory" in str(info.value)
+    assert "FixedPose" in str(info.value)
