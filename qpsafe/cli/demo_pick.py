@@ -153,7 +153,7 @@ def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check
         table.add_row(_seed(item, alone), *map(str, counts), f"{item.duration:.1f}", extra)
     screen.print(table)
     table = Table(title="Third experiment: safety")
-    for heading in ("seed", "nearest, m", "moving, m", "contacts", "furniture, mm", "suspended", "largest CDF_n"):
+    for heading in ("seed", "nearest, m", "moving, m", "contacts", "tables, mm", "suspended", "largest CDF_n"):
         table.add_column(heading, justify="right")
     for item in (alone, *runs):
         gaps = ("-" if item is alone else f"{value:.3f}" for value in (item.nearest, item.nearest_moving))

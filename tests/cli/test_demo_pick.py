@@ -40,4 +40,4 @@ def test_the_demo_writes_what_it_says(tmp_path: Path) -> None:
     assert [item["seed"] for item in report["runs"]] == [0, 1]
     assert all(item["delivered"] == 1 for item in report["runs"])
     names = {path.name for path in out.iterdir()} - {"snapshots.png"}  # needs OpenGL
-    assert names == {"figure.png", "report.json", "seeds.png", "signals.csv"}
+    assert names == {"figure.png", "report.json", "run.npz", "seeds.png", "signals.csv"}

@@ -69,6 +69,14 @@ def test_the_third_experiment_grips_over_the_wire() -> None:
 
 
 @pytest.mark.slow
+def test_the_robot_does_not_evade_its_own_load_when_answers_are_late() -> None:
+    """Ada's first visit makes the arm fold up with a screw in its gripper; it goes on when she leaves."""
+    found = in_one_process("pick-and-place", load_robot("irb140"), 45.0, EgmSettings(), delay=1, cycles=3)
+    assert found.deeds == {"grip": 3, "release": 3, "delivered": 3, "take": 1}
+    assert found.parts["elsewhere"] == 0
+
+
+@pytest.mark.slow
 def test_bad_wire_restart_and_motors_off_over_real_sockets() -> None:
     """Everything at once, in real time: the stream goes on, and ends at rest."""
     robot = load_robot("irb140")
