@@ -22,7 +22,7 @@ from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits
 from qpsafe.recovery import Recovery, RecoveryRules
 from qpsafe.reference import JointReference
-from qpsafe.resolve import Resolver, judged, resolve
+from qpsafe.resolve import Resolved, Resolver, judged, resolve
 from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -234,22 +234,19 @@ class SafetyController:
             barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
             soft = (barrier,) if barrier else ()
             resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
-        command, excess, box, result, errors = resolved
-        usual = excess <= 1e-9 and result.status == "solved"
+        command, usual = resolved.command, resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self.robot.joint_names)
         if self.barrier:  # exact, as far as the acceleration limits allow
             command = self.barrier.scale(measured, command, seen.points).factor * command
             command = box.clip(command) if box else command
         if seen.capped:  # a sector is unseen
-            command = slowed(command, commanded, self.rules.speed_cap, box)
+            command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
-        if not self.recovery.on_path:
-            errors = self._errors(commanded)
+        off_path = None if self.recovery.on_path else self._errors(commanded)
         messages = (*messages, *seen.notes)
-        self._advance(command)
         return Tick(
-            reference=self._reference(),
+            reference=self._advance(command),
             cdf_n=cdf_n,
             m=switches[0],
             f=switches[1] if len(switches) > 1 else 1.0,
@@ -262,12 +259,11 @@ class SafetyController:
             points=seen.points,
             links=seen.links,
             vectors=vectors,
-            errors=errors,
             path_time=self.recovery.path_time,
             events=self.recovery.take_events(),
-            box=box,
-            law=result,
             joint_names=self.robot.joint_names,
+            resolved=resolved,
+            off_path=off_path,
         )
 
     def _resolver(self) -> Resolver | None:
@@ -282,11 +278,11 @@ class SafetyController:
         """Brake towards standstill within the limits and hold."""
         box = self._brake_limits.box(self._q, self._qd)
         most = self._brake_limits.max_acceleration * self.dt
-        self._advance(self._qd - np.clip(self._qd, -most, most))  # inside the box, whose speeds can all be braked
+        slower = self._qd - np.clip(self._qd, -most, most)  # inside the box, whose speeds can all be braked
         qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # no danger is known: what was known fades
         none = (0.0,) * len(self.tasks)
         return Tick(
-            reference=self._reference(),
+            reference=self._advance(slower),
             cdf_n=float("nan"),
             m=0.0,
             f=0.0,
@@ -297,16 +293,15 @@ class SafetyController:
             messages=(message,),
             qd0=qd0,
             path_time=self.recovery.path_time,
-            box=box,
             joint_names=self.robot.joint_names,
+            resolved=Resolved(slower, 0.0, False, box, None, ()),
         )
 
-    def _advance(self, command: NDArray[np.float64]) -> None:
-        self._qd_before, self._qd = self._qd, command
+    def _advance(self, command: NDArray[np.float64]) -> JointReference:
+        """Integrate; the reference's arrays are nobody else's."""
+        self._qd_before, self._qd = self._qd, command.copy()
         self._q = self._q + command * self.dt
-
-    def _reference(self) -> JointReference:
-        return JointReference(self._seq, self._seq * self.dt, self._q.copy(), self._qd.copy(), self._active)
+        return JointReference(self._seq, self._seq * self.dt, self._q.copy(), command, self._active)
 
     def _errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:
         """Errors against the tasks' own trajectories, not against the way back to them."""

@@ -7,8 +7,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +19,11 @@ from numpy.typing import NDArray
 from qpsafe.checks import checked_velocity
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import layout_for
+from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.resolve_kernel import parts, resolve_quickly
+from qpsafe.resolve_kernel import Parts, parts, resolve_quickly
 from qpsafe.tasks.task import PoseTask
 
 if TYPE_CHECKING:
@@ -35,21 +39,24 @@ Array = NDArray[np.float64]
 _FLOAT = np.dtype(np.float64)
 
 
-class Resolved(NamedTuple):
+@dataclass
+class Resolved:
     """What is to be done in a tick.
 
     Attributes:
         command: Joint velocity (n,) [rad/s], inside the box.
         excess: By how much the law's answer was outside; NaN if a limit gave way.
+        solved: Whether the law answered as planned.
         box: Admissible velocities.
-        result: The law's answer.
+        result: The law's answer; None if it was not asked.
         errors: Of the tasks against their references of this tick.
     """
 
     command: Array
     excess: float
+    solved: bool
     box: Box | None
-    result: LawResult
+    result: LawResult | None
     errors: tuple[Array, ...]
 
 
@@ -86,20 +93,21 @@ def resolve(
     result = law.solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
     answer = checked_velocity(result, commanded.q, dt)
     command, excess = box.admit(answer) if box else (answer.copy(), 0.0)
-    return Resolved(command, excess, box, result, tuple([clik.error for clik in wanted]))
+    return Resolved(command, excess, result.status == SOLVED, box, result, tuple([clik.error for clik in wanted]))
 
 
 def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
     """What was unusual, in words: limits that gave way, a law that exceeded them, a solver that did not finish."""
-    _, excess, box, result, _ = resolved
+    box, result = resolved.box, resolved.result
+    assert result is not None
     messages: tuple[str, ...] = ()
-    if box is not None and not excess <= 1e-9:
+    if box is not None and not resolved.excess <= 1e-9:
         beyond = np.abs(box.clip(result.qd) - result.qd) > 1e-9
         messages = box.notes(names)
         if beyond.any():
             clipped = ", ".join(name for name, much in zip(names, beyond, strict=True) if much)
             messages = (*messages, "the law exceeded the limits, clipped: " + clipped)
-    return messages if result.status == "solved" else (*messages, f"law: {result.status}")
+    return messages if resolved.solved else (*messages, f"law: {result.status}")
 
 
 class Resolver:
@@ -130,9 +138,9 @@ class Resolver:
         self._gains = np.empty(len(tasks))
         self._layout = layout_for(robot.nq, counts)
         n, rows, kinds = robot.nq, sum(counts), len(tasks) + 1
-        self._sizes = n, rows, kinds
-        self._floats = rows * n + 2 * rows + (4 + kinds) * n  # of `parts`
-        self._ends = [0, *np.cumsum(counts).tolist()]
+        self._weights = np.empty(kinds)
+        self._floats = rows * n + 2 * rows + (3 + kinds) * n  # of `parts`
+        self._integers = 3 * n + kinds * (HEADER + 2 * n + rows)
 
     @staticmethod
     def fits(tasks: Sequence[Task], law: Any, limits: Any) -> bool:
@@ -159,7 +167,7 @@ class Resolver:
             activations: Of the tasks.
         """
         begin = perf_counter()
-        goals, twists, gains = self._goals, self._twists, self._gains
+        goals, twists, gains, weights = self._goals, self._twists, self._gains, self._weights
         for k, sample in enumerate(samples):
             pose, twist = sample.pose, sample.twist
             if not (type(pose) is type(twist) is np.ndarray and pose.dtype is twist.dtype is _FLOAT):
@@ -167,19 +175,48 @@ class Resolver:
             if pose.shape != (4, 4) or twist.shape != (6,):
                 return None
             goals[k], twists[k], gains[k] = pose, twist, self._tasks[k].gain
-        (n, rows, kinds), weights = self._sizes, weights_of(activations)
-        numbers, info = np.zeros(self._floats), np.zeros((kinds, HEADER + 2 * n + rows), dtype=np.int64)
-        codes = np.empty((3, n), dtype=np.int64)
+        weights[:] = given = weights_of(activations)
+        command, floats, integers = np.empty(len(qd)), np.zeros(self._floats), np.zeros(self._integers, dtype=np.int64)
         excess, worst = resolve_quickly(
-            state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, np.array(weights), self._law.damping,
-            *self._layout, numbers, info, codes,
+            state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, weights, self._law.damping,
+            *self._layout, floats, integers, command,
         )  # fmt: skip
-        A, b, e, x, bounds, blend, command = parts(numbers, n, rows, kinds)
         if excess < 0.0:
-            raise ValueError(f"the law returned a velocity that is not finite or absurd: {blend}")
-        lower, upper = bounds
-        data, ends = (A, b, qd0, lower, upper), self._ends
+            raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
         taken = perf_counter() - begin
-        result = BlendResult(blend, x, info, weights, data, self._counts, taken, worst == 0.0)
-        errors = tuple([e[ends[k] : ends[k + 1]] for k in range(kinds - 1)])
-        return Resolved(command, excess, Box(lower, upper, *codes), result, errors)
+        return QuicklyResolved(command, excess, worst == 0.0, (floats, integers, qd0, given, self._counts, taken))
+
+
+class QuicklyResolved(Resolved):
+    """`Resolved` by one compiled call: the arrays it filled are cut, and explained, when they are looked at.
+
+    Args:
+        command, excess, solved: As for `Resolved`.
+        filled: Results of `resolve_quickly`, the evasive velocity, the regimes' weights, rows of each task, time [s].
+    """
+
+    def __init__(self, command: Array, excess: float, solved: bool, filled: tuple[Any, ...]) -> None:
+        self.command, self.excess, self.solved, self._filled = command, excess, solved, filled
+
+    @cached_property
+    def _parts(self) -> Parts:
+        floats, integers, _, weights, counts, _ = self._filled
+        return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
+
+    @cached_property
+    def box(self) -> Box:  # type: ignore[override]
+        """Admissible velocities."""
+        return Box(*self._parts.bounds, *self._parts.codes)
+
+    @cached_property
+    def result(self) -> LawResult:  # type: ignore[override]
+        """The law's answer."""
+        cut, (_, _, qd0, weights, counts, taken) = self._parts, self._filled
+        data = (cut.A, cut.b, qd0, *cut.bounds)
+        return BlendResult(cut.blend, cut.x, cut.info, weights, data, counts, taken, self.solved)
+
+    @cached_property
+    def errors(self) -> tuple[Array, ...]:  # type: ignore[override]
+        """Of the tasks."""
+        ends = [0, *accumulate(self._filled[4])]
+        return tuple([self._parts.e[first:last] for first, last in pairwise(ends)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from numba import types
 
 from qpsafe import limits as limits_module
@@ -9,6 +11,7 @@ from qpsafe.checks import ABSURD_STEP
 from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, entry, inline, readable
 from qpsafe.hqp import own_regimes
+from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import solve_regimes
 from qpsafe.hqp.own_solver import MODULES
 from qpsafe.limits import admit_into, box_into
@@ -18,25 +21,50 @@ from qpsafe.tasks import clik
 from qpsafe.tasks.clik import pose_rows
 
 
-def parts(numbers: Array, n: int, rows: int, kinds: int) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-    """Results of `resolve_quickly`: J (rows, n), ẋ, e (rows,), regimes (tasks + 1, n), box (2, n), blend, command."""
+class Parts(NamedTuple):
+    """Results of `resolve_quickly`; n joints, a regime more than tasks.
+
+    Attributes:
+        A: Jacobians of the tasks (rows, n).
+        b: ẋ = ẋ_d + K e (rows,).
+        e: Errors (rows,).
+        x: q̇ of each regime (regimes, n).
+        bounds: Box, lower and upper (2, n).
+        blend: The law's q̇ (n,).
+        codes: Kinds of the box's limits, lower, upper, sacrificed (3, n).
+        info: What the solver says of each regime (regimes, 3 + 2 n + rows).
+    """
+
+    A: Array
+    b: Array
+    e: Array
+    x: Array
+    bounds: Array
+    blend: Array
+    codes: Index
+    info: Index
+
+
+def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tuple[Any, ...]:
+    """Cut `Parts` from two blocks."""
     a = rows * n
     b = a + 2 * rows
     c = b + kinds * n
     return (
-        numbers[:a].reshape(rows, n),
-        numbers[a : a + rows],
-        numbers[a + rows : b],
-        numbers[b:c].reshape(kinds, n),
-        numbers[c : c + 2 * n].reshape(2, n),
-        numbers[c + 2 * n : c + 3 * n],
-        numbers[c + 3 * n :],
+        floats[:a].reshape(rows, n),
+        floats[a : a + rows],
+        floats[a + rows : b],
+        floats[b:c].reshape(kinds, n),
+        floats[c : c + 2 * n].reshape(2, n),
+        floats[c + 2 * n :],
+        integers[: 3 * n].reshape(3, n),
+        integers[3 * n :].reshape(kinds, HEADER + 2 * n + rows),
     )
 
 
-_cut_numbers = inline(parts)
+_cut = inline(parts)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
-_any, _ints, _int_rows = readable(1), types.Array(types.int64, 1, "C", readonly=True), types.int64[:, ::1]
+_any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
 
 
 @entry(
@@ -44,18 +72,18 @@ _any, _ints, _int_rows = readable(1), types.Array(types.int64, 1, "C", readonly=
         _one, _any, _one, _two, types.int64, _ints, _three, _ints, _two, types.float64, types.float64,
         _one, _three, _two, _one, _one, types.float64,
         types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
-        _ints, types.float64[::1], _int_rows, _int_rows,
+        _ints, types.float64[::1], types.int64[::1], types.float64[::1],
     ),
     compiled, kinematics, clik, limits_module, own_regimes, *MODULES,
 )  # fmt: skip
 def resolve_quickly(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
     limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
-    weights: Array, damping: float, floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index,
-    ends: Index, numbers: Array, info: Index, codes: Index,
+    weights: Array, damping: float, work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index,
+    ends: Index, floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Fill numbers (see `parts`), info per regime, codes of the box; returns excess, -1 if q̇ is absurd, worst code."""
-    A, b, e, x, bounds, blend, command = _cut_numbers(numbers, q.shape[0], rows.shape[0], weights.shape[0])
+    """Fill floats and integers (zeros; see `Parts`), command; returns excess, -1 if q̇ is absurd, and the worst code."""
+    A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, q.shape[0], rows.shape[0], weights.shape[0])
     poses, axes, _, _ = cut(memory, q.shape[0], k)
     # CLIK: ẋ = ẋ_d + K e
     for t in range(bodies.shape[0]):
@@ -67,13 +95,16 @@ def resolve_quickly(
     # limits -> box; regimes of the law within it, blended
     box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
     solve_regimes(
-        floats, integers, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
+        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
         blend,
     )  # fmt: skip
     # checked: finite, sane, inside the box
+    sane = True
     for i in range(blend.shape[0]):
-        if not abs(blend[i]) * dt < ABSURD_STEP:  # true for NaN
-            return -1.0, 0.0
+        command[i] = blend[i]
+        sane = sane and abs(blend[i]) * dt < ABSURD_STEP  # false for NaN
+    if not sane:
+        return -1.0, 0.0
     worst = 0
     for kept in range(info.shape[0]):
         worst = max(worst, info[kept, 0])

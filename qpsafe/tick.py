@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.reference import JointReference
+from qpsafe.resolve import Resolved
 
 #: The tick went as planned.
 OK = "ok"
@@ -44,14 +45,13 @@ class Tick:
         points: Detected points that counted, (p, 3), world frame [m].
         links: Wire link that each point belongs to, (p,), from 0.
         vectors: Danger vectors (6) at the points, (p, 3).
-        errors: Task errors of the commanded pose against the tasks' own trajectories, per task (rows,).
         path_time: Clock of the tasks' trajectories [s].
         events: Names of the events that the tasks' programs reached at this tick, e.g. ``grip``.
-        box: Admissible joint velocities of this tick; None without limits.
-        law: What the law answered, with the solution of every regime; None if it was not asked.
         severity: Of sick sensors, until acknowledged: ``clear``, ``capped`` (speed) or ``stopped``.
         unseen: Names of the spots that cannot be trusted now: nobody knows what is in front of them.
         joint_names: (n,) names used in reports.
+        resolved: What tasks, limits and law came to; None if they were not asked.
+        off_path: `errors` where the references of this tick were not the tasks' own trajectories.
     """
 
     reference: JointReference
@@ -68,14 +68,30 @@ class Tick:
     points: NDArray[np.float64] = field(default_factory=_no_vectors)
     links: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     vectors: NDArray[np.float64] = field(default_factory=_no_vectors)
-    errors: tuple[NDArray[np.float64], ...] = ()
     path_time: float = 0.0
     events: tuple[str, ...] = ()
-    box: Box | None = None
-    law: LawResult | None = None
     severity: str = "clear"
     unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
+    resolved: Resolved | None = field(default=None, repr=False)
+    off_path: tuple[NDArray[np.float64], ...] | None = field(default=None, repr=False)
+
+    @property
+    def errors(self) -> tuple[NDArray[np.float64], ...]:
+        """Task errors of the commanded pose against the tasks' own trajectories, per task (rows,)."""
+        if self.off_path is not None:
+            return self.off_path
+        return () if self.resolved is None else self.resolved.errors
+
+    @property
+    def box(self) -> Box | None:
+        """Admissible joint velocities of this tick; None without limits."""
+        return None if self.resolved is None else self.resolved.box
+
+    @property
+    def law(self) -> LawResult | None:
+        """What the law answered, with the solution of every regime; None if it was not asked."""
+        return None if self.resolved is None else self.resolved.result
 
     @property
     def binding(self) -> tuple[str, ...]:
