@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from math import isfinite
-from operator import is_not
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,14 +14,15 @@ from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
-from qpsafe.danger.push import push
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits
+from qpsafe.quick import Quick
 from qpsafe.recovery import Recovery, RecoveryRules
 from qpsafe.reference import JointReference
-from qpsafe.resolve import Resolved, Resolver, judged, resolve
-from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
+from qpsafe.resolve import Resolved, judged, resolve
+from qpsafe.sense import sense
+from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
@@ -98,9 +97,7 @@ class SafetyController:
         self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known, carried) if self.spots else None
         self.barrier = barrier
         self.recovery_rules = RecoveryRules() if recovery is None else recovery
-        self._quick: Resolver | None = None
-        self._quick_for: tuple[Any, ...] = ()
-        self._resolver()  # compiles now if need be, not within the first tick
+        self._quick = Quick(robot)
         self.reset()
 
     def reset(self) -> None:
@@ -203,22 +200,19 @@ class SafetyController:
         points: ArrayLike | None,
         ages: ArrayLike | None,
     ) -> Tick:
-        q = as_joint_position(q, self.robot)
-        qd = as_joint_velocity(qd, self.robot)
         if not self._active:  # the commanded configuration starts where the robot is
-            self._q, self._active = np.array(q), True
+            here, _ = as_joint_position(q, self.robot), as_joint_velocity(qd, self.robot)
+            self._q, self._active = np.array(here), True
             self._qd = self._qd_before = np.zeros(self.robot.nq)
 
-        # spot distances -> detected points (7), without known obstacles and the robot itself, lost ones held
-        measured = self.robot.at(q)
-        wire = measured.wire(qd)
-        seen = as_detection(measured, wire, self.sensing, distances, points, ages)
-
-        # danger (1)-(6); its vectors summed per link (8), as virtual torque (14), (15), as evasive velocity (16)
-        danger, vectors, torque, cdf_n = push(self.field, measured, wire, seen.points, seen.links, seen.velocities)
-        if not isfinite(cdf_n):  # never into the filter, which remembers
-            raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
-        qd0 = self.evasion.step(torque).copy()
+        # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
+        quick = (
+            None if self.barrier or points is not None else self._quick.sense(self.sensing, self.field, self.evasion)
+        )
+        seen = None if quick is None else quick(q, qd, distances, ages)
+        if seen is None:
+            seen = sense(self.robot, q, qd, distances, points, ages, self.sensing, self.field, self.evasion)
+        cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self.activation.at(cdf_n)
@@ -226,18 +220,18 @@ class SafetyController:
         samples = self.recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        quick = None if self.barrier else self._resolver()
-        resolved = None if quick is None else quick(commanded, self._qd, samples, qd0, activations)
+        resolver = None if self.barrier else self._quick.resolver(self.tasks, self.law, self.limits)
+        resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
             qdd = (self._qd - self._qd_before) / self.dt
             box = self.limits.box(self._q, self._qd, qdd) if self.limits else None
-            barrier = self.barrier and self.barrier.level(measured, self._qd, seen.points, danger)
+            barrier = self.barrier and self.barrier.level(seen.measured, self._qd, seen.points, seen.danger)
             soft = (barrier,) if barrier else ()
             resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
         command, usual = resolved.command, resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self.robot.joint_names)
         if self.barrier:  # exact, as far as the acceleration limits allow
-            command = self.barrier.scale(measured, command, seen.points).factor * command
+            command = self.barrier.scale(seen.measured, command, seen.points).factor * command
             command = box.clip(command) if box else command
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
@@ -258,21 +252,13 @@ class SafetyController:
             qd0=qd0,
             points=seen.points,
             links=seen.links,
-            vectors=vectors,
+            vectors=seen.vectors,
             path_time=self.recovery.path_time,
             events=self.recovery.take_events(),
             joint_names=self.robot.joint_names,
             resolved=resolved,
             off_path=off_path,
         )
-
-    def _resolver(self) -> Resolver | None:
-        """Tasks, limits and law as one compiled call, where they are of the built-in kind."""
-        parts = (self.tasks, self.law, self.limits)
-        if not self._quick_for or any(map(is_not, self._quick_for, parts)):  # at first, and when somebody exchanged one
-            self._quick = Resolver(self.robot, *parts) if Resolver.fits(*parts) else None  # type: ignore[arg-type]
-            self._quick_for = parts
-        return self._quick
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -49,15 +50,20 @@ def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Call
     return compiled
 
 
-def linked(compiled: Any, name: str) -> Callable[..., Any]:
+def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
     """What `entry` compiled, for other compiled code: called at its address, not compiled into the caller once more.
 
     numba itself would link and optimise the callee's code again in every caller, which takes as long as compiling it.
 
     Args:
         compiled: A compiled function of one signature.
-        name: A name that changes with its code: callers in the cache ask for the code under this name.
+        uses: Modules whose code is in it, as for `entry`. Callers in the cache ask for it by a name that tells the
+            state of these and of its own.
     """
+    if numba.config.DISABLE_JIT:
+        return compiled
+    function = compiled.py_func
+    name = f"qpsafe_{function.__name__}_{checksum(sys.modules[function.__module__], *uses):08x}"
     (result,) = compiled.overloads.values()
     own = result.signature
     llvm.add_symbol(name, result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
@@ -66,13 +72,13 @@ def linked(compiled: Any, name: str) -> Callable[..., Any]:
         def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
             convention = context.call_conv
             declared = convention.get_function_type(own.return_type, own.args)
-            function = cgutils.get_or_insert_function(builder.module, declared, name)
-            return convention.call_function(builder, function, own.return_type, own.args, values)[1]
+            code = cgutils.get_or_insert_function(builder.module, declared, name)
+            return convention.call_function(builder, code, own.return_type, own.args, values)[1]
 
         return own, generate
 
     context = Parameter("typing_context", Parameter.POSITIONAL_OR_KEYWORD)
-    call.__signature__ = Signature([context, *signature(compiled.py_func).parameters.values()])  # type: ignore[attr-defined]
+    call.__signature__ = Signature([context, *signature(function).parameters.values()])  # type: ignore[attr-defined]
     return intrinsic(call)
 
 

@@ -77,7 +77,8 @@ def _torque(J, starts, stops, forces, torque):  # type: ignore[no-untyped-def]
 
 
 @entry(types.void(readable(2), readable(2), readable(1), readable(1), types.float64[::1]))
-def _filter(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
+def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
+    """after = A before + B σ."""
     for i in range(len(before)):
         after[i] = 0.0
         for j in range(len(before)):
@@ -112,9 +113,14 @@ class Evasion:
     def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
         """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s]."""
         velocity = np.empty(len(self.velocity))
-        _filter(self._A, self._B, self.velocity, sigma, velocity)
+        filter_by(self._A, self._B, self.velocity, sigma, velocity)
         self.velocity = velocity
         return velocity
+
+    @property
+    def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A, B (n, n) of a step, q̇0 <- A q̇0 + B σ."""
+        return self._A, self._B
 
     def reset(self) -> None:
         """Forget the past: q̇0 = 0."""

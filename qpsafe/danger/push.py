@@ -67,12 +67,15 @@ _rows, _ints = readable(2), types.Array(types.int64, 1, "A", readonly=True)
 _weights, _out, _outs = types.UniTuple(types.float64, 3), types.float64[::1], types.float64[:, ::1]
 
 
+USES = (compiled, evasion, field, kernel, vector, kinematics)
+
+
 @entry(
     types.float64(
         _rows, _rows, _ints, _rows, _rows, _rows, _rows, _weights, types.float64,
         types.Array(types.float64, 1, "C", readonly=True), types.int64, _ints, _ints, _out, _outs, _out,
     ),
-    compiled, evasion, field, kernel, vector, kinematics,
+    *USES,
 )  # fmt: skip
 def push_by(
     points: Array,

@@ -63,7 +63,7 @@ def _compile(key: int) -> Callable[..., None]:
 
 SOURCES = checksum(*MODULES)
 solve = _compile(SOURCES)
-solve_compiled = linked(solve, f"qpsafe_own_solver_{SOURCES:08x}")
+solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""
 _NO_WEIGHTS = np.empty(0)
 _memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}

@@ -51,18 +51,18 @@ PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
 
 def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q (n,) [rad], finite and not absurd, the caller's own array if it may be; or BadInput."""
-    lowest, highest, _, _ = _plausible(robot)
+    lowest, highest, _, _ = plausible(robot)
     return _as_joint_vector("q", value, lowest, highest, robot.joint_names)
 
 
 def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Measured q̇ (n,) [rad/s], finite and not absurd, the caller's own array if it may be; or BadInput."""
-    _, _, lowest, highest = _plausible(robot)
+    _, _, lowest, highest = plausible(robot)
     return _as_joint_vector("qd", value, lowest, highest, robot.joint_names)
 
 
 @functools.lru_cache(maxsize=16)
-def _plausible(robot: Robot) -> tuple[NDArray[np.float64], ...]:
+def plausible(robot: Robot) -> tuple[NDArray[np.float64], ...]:
     """Lowest and highest position, lowest and highest velocity that can be a measurement, (n,) each."""
     speed = PLAUSIBLE_SPEED * robot.max_velocity
     return robot.lower - PLAUSIBLE_EXCESS, robot.upper + PLAUSIBLE_EXCESS, -speed, speed

@@ -19,6 +19,8 @@ from qpsafe.sensing.velocity import approach
 _floats, _rows = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 2, "C", readonly=True)
 _ints, _out, _outs = types.Array(types.int64, 1, "C", readonly=True), types.float64[::1], types.float64[:, ::1]
 
+USES = (compiled, kinematics, health, hold, hulls, spots, velocity)
+
 
 @entry(
     types.UniTuple(types.int64, 3)(
@@ -28,7 +30,7 @@ _ints, _out, _outs = types.Array(types.int64, 1, "C", readonly=True), types.floa
         types.int64[:, ::1], _outs, types.boolean[::1], _outs, types.int64[::1], _outs,
         _outs, types.int64[::1], _outs,
     ),
-    compiled, kinematics, health, hold, hulls, spots, velocity,
+    *USES,
 )  # fmt: skip
 def take_readings(
     distances: Array,

@@ -93,9 +93,9 @@ class DistanceSensing:
         links = np.asarray(spots.links, dtype=np.int64)
         cone = np.tan(0.5 * spots.field_of_view)
         ranges = np.ascontiguousarray(np.column_stack((spots.range_max, cone)))
-        self._fresh = np.zeros(count)
-        self._tables = (bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
-        self._memory = (
+        self.fresh = np.zeros(count)
+        self.tables = (bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
+        self.memory = (
             self.health.counts, self.health.seen, self.health.dead,
             self._hold.held, self._hold.age, self._velocity.track,
         )  # fmt: skip
@@ -128,17 +128,21 @@ class DistanceSensing:
             distances: One reading a spot (k,) [m], any numbers: +inf where nothing is in sight (REP 117).
             ages: How old each reading is (k,) [s]; None for fresh ones.
         """
-        k = len(self._fresh)
+        k = len(self.fresh)
         points, links, velocities = np.empty((k, 3)), np.empty(k, dtype=np.int64), np.empty((k, 3))
         count, dead, out = take_readings(
-            distances, self._fresh if ages is None else ages, state.memory, wire.starts, wire.ends,
-            *self._tables, *self._memory, points, links, velocities,
+            distances, self.fresh if ages is None else ages, state.memory, wire.starts, wire.ends,
+            *self.tables, *self.memory, points, links, velocities,
         )  # fmt: skip
+        severity, too_many, notes = self.take(dead, out)
+        moving = velocities[:count] if self.rules.velocities else None
+        return Seen(points[:count], links[:count], moving, severity, too_many, notes)
+
+    def take(self, dead: int, out: int) -> tuple[str, bool, tuple[str, ...]]:
+        """Take how many spots are dead, and how many dead or unusable: severity, too_many and notes as in `Seen`."""
         health = self.health
         health.take(dead, out)
-        moving = velocities[:count] if self.rules.velocities else None
-        notes = self._notes() if out or health.stopped else ()
-        return Seen(points[:count], links[:count], moving, health.severity, health.too_many, notes)
+        return health.severity, health.too_many, self._notes() if out or health.stopped else ()
 
     @property
     def unseen(self) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ def inner(factor: float, vector: np.ndarray, negative: bool, first: int, out: np
     return total
 
 
-_inner = linked(inner, "qpsafe_test_inner")
+_inner = linked(inner)
 
 
 @entry(types.float64(types.float64, types.float64[:, ::1], types.boolean, types.int64, types.float64[:, ::1]))

@@ -1,0 +1,41 @@
+"""The compiled calls that fit what a controller is made of; its parts may be exchanged at any time."""
+
+from __future__ import annotations
+
+from operator import is_not
+from typing import TYPE_CHECKING, Any
+
+from qpsafe.resolve import Resolver
+from qpsafe.sense import QuickSense
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+
+class Quick:
+    """Makes the compiled calls at first, and again when somebody exchanged a part.
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._made: dict[Any, tuple[tuple[Any, ...], Any]] = {}
+
+    def sense(self, sensing: Any, field: Any, evasion: Any) -> QuickSense | None:
+        """Measurements to q̇0, where all of it is of the built-in kind."""
+        call: QuickSense | None = self._get(QuickSense, (sensing, field, evasion))
+        return call
+
+    def resolver(self, tasks: Any, law: Any, limits: Any) -> Resolver | None:
+        """Tasks, limits and law, where all of it is of the built-in kind."""
+        call: Resolver | None = self._get(Resolver, (tasks, law, limits))
+        return call
+
+    def _get(self, kind: Any, parts: tuple[Any, ...]) -> Any:
+        made = self._made.get(kind)
+        if made is None or any(map(is_not, made[0], parts)):
+            fits = kind.fits(*parts)
+            made = self._made[kind] = (parts, kind(self._robot, *parts) if fits else None)
+        return made[1]
