@@ -83,6 +83,7 @@ def seeds_figure(runs: Sequence[PickFigures], alone: PickFigures, path: Path) ->
             left.plot([item.seed] * len(item.cycle_times), item.cycle_times, ".", color=BLUE, markersize=4)
         left.axhline(float(np.median(alone.cycle_times)), color=GREY, linestyle="--", label="without people (median)")
         left.set(xlabel="seed", ylabel="time of a cycle [s]", ylim=(0.0, None))
+        left.xaxis.get_major_locator().set_params(integer=True)
         left.legend(loc="lower right")
         costs = np.array([cost(item, alone) for item in runs])
         right.boxplot(costs, widths=0.4, showfliers=False)
