@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EgmSettings:
-    """What a RAPID program sets with EGMSetupUC, EGMActJoint and EGMRunJoint; the defaults are those of examples/rapid.
+    """What a RAPID program sets with EGMSetupUC, EGMActJoint and EGMRunJoint.
+
+    The defaults are those of examples/rapid, but for a longer `comm_timeout`, a `cond_time` that never ends, and no
+    `ramp_in`: they hide least of what the streamer does.
 
     Attributes:
         gain: k, the default proportional position gain, 0 to 20 [1/s].
