@@ -18,9 +18,10 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits
 from qpsafe.quick import Quick
-from qpsafe.recovery import Recovery, RecoveryRules
+from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.reference import JointReference
 from qpsafe.resolve import Resolved, judged, resolve
+from qpsafe.returns import GentleLimits
 from qpsafe.sense import sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
@@ -97,7 +98,7 @@ class SafetyController:
         self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known, carried) if self.spots else None
         self.barrier = barrier
         self.recovery_rules = RecoveryRules() if recovery is None else recovery
-        self._quick = Quick(robot)
+        self._quick, self._gentle = Quick(robot), GentleLimits(self.recovery_rules.acceleration)
         self.reset()
 
     def reset(self) -> None:
@@ -220,11 +221,13 @@ class SafetyController:
         samples = self.recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        resolver = None if self.barrier else self._quick.resolver(self.tasks, self.law, self.limits)
+        limits, qdd = self.limits, (self._qd - self._qd_before) / self.dt
+        if self.recovery.phase == RECOVERING and limits:
+            limits = self._gentle.choose(limits, self._q, self._qd, qdd)
+        resolver = None if self.barrier else self._quick.resolver(self.tasks, self.law, limits)
         resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
-            qdd = (self._qd - self._qd_before) / self.dt
-            box = self.limits.box(self._q, self._qd, qdd) if self.limits else None
+            box = limits.box(self._q, self._qd, qdd) if limits else None
             barrier = self.barrier and self.barrier.level(seen.measured, self._qd, seen.points, seen.danger)
             soft = (barrier,) if barrier else ()
             resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)

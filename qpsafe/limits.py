@@ -111,6 +111,12 @@ class JointLimits:
             if not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
 
+    def gentler(self, share: float) -> JointLimits:
+        """The same limits with a share of the acceleration."""
+        acceleration = share * self.max_acceleration
+        rest = self.dt, self.return_speed, self.max_jerk
+        return JointLimits(self.lower, self.upper, self.max_velocity, acceleration, *rest)
+
     def box(self, q: NDArray[np.float64], qd: NDArray[np.float64], qdd: NDArray[np.float64] | None = None) -> Box:
         """Admissible velocities for the next tick.
 

@@ -6,6 +6,7 @@ following ──danger above Δ(1-ε)──> suspended ──danger below──>
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -28,9 +29,9 @@ class Recovery:
     """Clock of the tasks' path, and the references that lead back to it.
 
     While suspended the clock stands still: x_d = x_d,s, ẋ_d = 0. When danger is past, every task returns smoothly from
-    where it is then, x_d,r, to x_d,s. A task that is still released (a_k < 1) is not pulled: its return begins when it
-    is fully active again, be it after the path has gone on. The path goes on when every fully active task has
-    returned; its clock then comes to speed within `ramp`.
+    where it is then, x_d,r, to x_d,s. A task that is still released (a_k < 1) is not pulled: it is held where it is,
+    its motion running out, and its return begins when it is fully active again and slow enough, be it after the path
+    has gone on. The path goes on when every fully active task has returned; its clock comes to speed within `ramp`.
 
     Args:
         tasks: The controller's tasks, highest priority first.
@@ -45,6 +46,7 @@ class Recovery:
         self.dt = dt
         self.rules = RecoveryRules() if rules is None else rules
         self.phase = FOLLOWING
+        self._kept = math.exp(-dt / self.rules.fade)  # of the speed of a held task, from tick to tick
         self.path_time = 0.0
         self.paused = False
         self._rate = 1.0  # of the clock
@@ -168,19 +170,16 @@ class Recovery:
         value = task.value(state)
         if not sample.finite:  # never into an offset, which remembers
             raise ValueError(f"the trajectory of the {task.name} task is not finite")
-        back = self._returns[k]
-        if back is None:  # x_d,r is where the task is when it may return
-            offset, joints = sample.offset(value), value.ndim == 1
-            before, self._offsets[k] = self._offset_before(k), offset
-            if not active >= 1.0:  # held, not pulled
-                return sample.displaced(offset, np.zeros_like(offset))
-            rate = (offset - before) / self.dt if before is not None else np.zeros_like(offset)
-            back = Return(offset, self.rules.slowed(rate, joints), self.rules.duration(offset, joints))
-        elif not active >= 1.0:
-            self._returns[k], self._offsets[k] = None, sample.offset(value)
-            return sample.displaced(self._offsets[k], np.zeros_like(self._offsets[k]))
-        else:
+        offset, before, joints = sample.offset(value), self._offset_before(k), value.ndim == 1
+        back, self._offsets[k] = self._returns[k], offset
+        if back is not None and active >= 1.0:
             back = replace(back, time=back.time + self.dt)
+        else:
+            rate = np.zeros_like(offset) if before is None else (offset - before) / self.dt
+            if not active >= 1.0 or self.rules.too_fast(rate, joints, getattr(task, "rows", range(6))):
+                self._returns[k] = None  # held, not pulled: its motion runs out
+                return sample.displaced(offset, self._kept * rate)
+            back = Return(offset, rate, self.rules.duration(offset, joints))  # x_d,r is where the task is now
         self._returns[k] = back
         if back.time >= back.duration:
             self._returns[k], self._pending[k] = None, False

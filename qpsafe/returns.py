@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.limits import JointLimits
 
 
 @dataclass(frozen=True)
@@ -18,20 +20,25 @@ class RecoveryRules:
 
     Attributes:
         speed, angular_speed, joint_speed: Peak speed of a return from rest [m/s], [rad/s], [rad/s]; what is left of the
-            evasive motion, at most as fast, runs out on top of it.
+            evasive motion runs out on top of it.
         shortest: Least duration of a return [s], so that small ones stay gentle.
+        fade: Time constant with which a task's motion runs out while it may not return or is faster than a return [s].
+        acceleration: Share of the joints' acceleration limits that is used on the way back, in (0, 1]; more only
+            where a joint could not stop before its position limit else.
         tolerance: Largest error norm at which a task counts as met [m or rad].
         ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
         enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
 
     Raises:
-        ConfigurationError: A value is not a finite number > 0.
+        ConfigurationError: A value is not a finite number > 0, or `acceleration` is more than 1.
     """
 
     speed: float = 0.25
     angular_speed: float = 0.8
     joint_speed: float = 0.8
     shortest: float = 0.4
+    fade: float = 0.1
+    acceleration: float = 0.5
     tolerance: float = 5e-4
     ramp: float = 0.2
     enabled: bool = True
@@ -41,6 +48,8 @@ class RecoveryRules:
             value = getattr(self, item.name)
             if item.name != "enabled" and not (isinstance(value, int | float) and 0.0 < value < math.inf):
                 raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
+        if self.acceleration > 1.0:
+            raise ConfigurationError("RecoveryRules", "acceleration", self.acceleration, "a share in (0, 1]")
 
     def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
         """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
@@ -51,13 +60,19 @@ class RecoveryRules:
             mean = max(shift / self.speed, turn / self.angular_speed)
         return max(15.0 / 8.0 * mean, self.shortest)
 
-    def slowed(self, rate: NDArray[np.float64], joints: bool) -> NDArray[np.float64]:
-        """The rate of an offset (6,) or (n,), no faster than a return."""
+    def too_fast(self, rate: NDArray[np.float64], joints: bool, rows: Sequence[int]) -> bool:
+        """Whether a rate of an offset (6,) or (n,) is above the peak speed of a return.
+
+        Args:
+            rate: [m/s, rad/s] or [rad/s].
+            joints: Whether it is one of joint positions.
+            rows: Which of the six a task on a pose controls.
+        """
         if joints:
-            return rate * min(1.0, self.joint_speed / max(float(np.abs(rate).max()), 1e-12))
-        linear, angular = max(float(np.linalg.norm(rate[:3])), 1e-12), max(float(np.linalg.norm(rate[3:])), 1e-12)
-        scale = min(1.0, self.speed / linear), min(1.0, self.angular_speed / angular)
-        return np.concatenate((scale[0] * rate[:3], scale[1] * rate[3:]))
+            return not float(np.abs(rate).max()) <= self.joint_speed
+        linear, angular = float(np.linalg.norm(rate[:3])), float(np.linalg.norm(rate[3:]))
+        moves, turns = min(rows) < 3, max(rows) >= 3
+        return (moves and not linear <= self.speed) or (turns and not angular <= self.angular_speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +97,34 @@ class Return:
         s, ds = minimum_jerk(self.time / T)
         r, dr = run_out(self.time / T)
         return sample.displaced((1.0 - s) * self.offset + r * T * self.speed, -ds / T * self.offset + dr * self.speed)
+
+
+class GentleLimits:
+    """Joint limits of the way back: a share of the acceleration, as long as the other limits can be met with it.
+
+    Args:
+        share: Of the acceleration limits.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self._made: tuple[JointLimits, JointLimits] | None = None
+
+    def choose(
+        self, limits: JointLimits, q: NDArray[np.float64], qd: NDArray[np.float64], qdd: NDArray[np.float64]
+    ) -> JointLimits:
+        """The limits of a tick on the way back; `limits` themselves where a joint has to be braked harder.
+
+        Args:
+            limits: The robot's.
+            q, qd, qdd: Commanded joint position, velocity and acceleration (n,) [rad, rad/s, rad/s²].
+        """
+        if type(limits) is not JointLimits:  # somebody's own
+            return limits
+        if self._made is None or self._made[0] is not limits:
+            self._made = limits, limits.gentler(self._share)
+        gentle = self._made[1]
+        return limits if gentle.box(q, qd, qdd).sacrificed.any() else gentle
 
 
 def minimum_jerk(tau: float) -> tuple[float, float]:

@@ -125,14 +125,13 @@ def promises(strict: PathFigures, without: PathFigures | None, others: Mapping[s
         checks.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", value, 1e-9, "a_max dt"))
     if without is not None:
         kinds = {
-            "joint speed": (strict.return_speed, without.return_speed, True),
-            "joint acceleration": (strict.return_acceleration, without.return_acceleration, False),
-            "joint acceleration, evasion braked": (strict.smooth_acceleration, without.smooth_acceleration, True),
+            "joint speed": (strict.return_speed, without.return_speed),
+            "joint acceleration": (strict.return_acceleration, without.return_acceleration),
+            "joint acceleration, evasion braked": (strict.smooth_acceleration, without.smooth_acceleration),
         }
-        for name, (with_it, without_it, strictly) in kinds.items():
-            promised = f"{'<' if strictly else '<='} {without_it:.3f} without recovery, and <= 1"
-            below = with_it < without_it if strictly else with_it <= without_it + 1e-9
-            kept = bool(below and with_it <= 1.0 + 1e-9)
+        for name, (with_it, without_it) in kinds.items():
+            kept = bool(with_it < without_it and with_it <= 1.0 + 1e-9)
+            promised = f"< {without_it:.3f} without recovery, and <= 1"
             checks.append(Check(f"strict: {name} on the way back", f"{with_it:.3f} of the limit", promised, kept))
     return checks
 

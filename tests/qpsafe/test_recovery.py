@@ -161,6 +161,42 @@ def test_a_return_begins_with_the_speed_of_the_robot() -> None:
     assert world.pose == pytest.approx(world.stopped, abs=1e-9)
 
 
+def test_a_task_faster_than_a_return_is_held_until_its_motion_has_run_out() -> None:
+    """No step in its speed when danger goes: it fades with a time constant, then the return begins from there."""
+    world, rules, fast = World(), RecoveryRules(), 0.6
+    world.run(10, SAFE)
+    world.run(1, DANGEROUS)
+    for _ in range(5):
+        world.push(y=fast * DT)
+    world.push(y=fast * DT, rest=False)
+    speed, held = fast, 0
+    while speed > rules.speed:
+        world.run(1, SAFE)
+        speed *= np.exp(-DT / rules.fade)
+        assert world.samples[0].twist[1] == pytest.approx(speed, rel=1e-9)
+        world.pose[1, 3] += world.samples[0].twist[1] * DT  # the reference of a tick is where its motion begins
+        held += 1
+    assert held == np.ceil(rules.fade / DT * np.log(fast / rules.speed))
+    world.run(1, SAFE)
+    assert world.samples[0].twist[1] == pytest.approx(speed, rel=1e-9)  # the return begins with what is left
+    assert world.run(400, SAFE)[-1] == FOLLOWING
+    assert world.pose == pytest.approx(world.stopped, abs=1e-9)
+
+
+def test_what_a_task_does_not_control_never_holds_its_return() -> None:
+    """The tool may turn as fast as evasion wants: position returns at once."""
+    world = World()
+    world.run(10, SAFE)
+    world.run(1, DANGEROUS)
+    for _ in range(5):
+        world.push(turn=2.0 * DT)
+    world.push(turn=2.0 * DT, rest=False)
+    while world.run(1, MEDIUM) == [RECOVERING]:
+        world.push(turn=2.0 * DT, rest=False)
+        assert world.recovery.path_time < 10 * DT + 1e-9
+    assert world.recovery.phase == FOLLOWING
+
+
 def test_danger_during_recovery_suspends_again() -> None:
     world = World()
     world.run(10, SAFE)
@@ -296,7 +332,9 @@ def test_without_recovery_the_path_goes_on_whatever_happens() -> None:
     assert recovery.path_time == pytest.approx(10 * DT)
 
 
-@pytest.mark.parametrize("key", ["speed", "angular_speed", "joint_speed", "shortest", "tolerance", "ramp"])
+@pytest.mark.parametrize(
+    "key", ["speed", "angular_speed", "joint_speed", "shortest", "fade", "acceleration", "tolerance", "ramp"]
+)
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "fast"])
 def test_rules_that_cannot_be_are_refused_by_name(key: str, value: object) -> None:
     with pytest.raises(ConfigurationError, match=key):
