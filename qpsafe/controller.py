@@ -258,6 +258,7 @@ class SafetyController:
             vectors=seen.vectors,
             path_time=self.recovery.path_time,
             events=self.recovery.take_events(),
+            waits_for=self.recovery.waits_for,
             joint_names=self.robot.joint_names,
             resolved=resolved,
             off_path=off_path,

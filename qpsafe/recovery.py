@@ -49,6 +49,8 @@ class Recovery:
         self._kept = math.exp(-dt / self.rules.fade)  # of the speed of a held task, from tick to tick
         self.path_time = 0.0
         self.paused = False
+        #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
+        self.waits_for: tuple[str, ...] = ()
         self._rate = 1.0  # of the clock
         self._changed = False
         self._cursors: list[_Cursor] = []
@@ -128,9 +130,10 @@ class Recovery:
         return tuple(name for _, name in sorted(found, key=lambda event: event[0]))
 
     def _next_phase(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> None:
+        self.waits_for = ()
         if self._changed:
             self._changed = False
-            if self.phase == FOLLOWING and not self._met(state, (1.0,) * len(self.tasks)):
+            if self.phase == FOLLOWING and self._not_met(state, (1.0,) * len(self.tasks)):
                 self._suspend()
         if not cdf_n <= self.suspend_above and self.rules.enabled:
             self._suspend()
@@ -140,7 +143,8 @@ class Recovery:
                     raise ValueError(f"the trajectory of the {task.name} task is not finite")
             self.phase = RECOVERING
         elif self.phase == RECOVERING:
-            if self._returned(activations) and self._met(state, activations):
+            self.waits_for = self._not_back(activations) or self._not_met(state, activations)
+            if not self.waits_for:
                 self.phase = FOLLOWING
         else:
             self._advance(state)
@@ -156,8 +160,10 @@ class Recovery:
         self._rate = max(self._rate - step, 0.0) if self.paused else min(self._rate + step, 1.0)
         ahead = self.path_time + self._rate * self.dt
         for cursor in self._cursors:
-            if cursor.due(ahead) and not self._met(state, (1.0,) * len(self.tasks)):
-                return
+            if cursor.due(ahead):
+                self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))
+                if self.waits_for:
+                    return
         self.path_time = ahead
 
     def _reference(self, k: int, state: RobotState, active: float) -> Any:
@@ -193,17 +199,20 @@ class Recovery:
             self._offsets[k] = sample.offset(self.tasks[k].value(state)) if sample.finite else None
         return self._offsets[k]
 
-    def _returned(self, activations: tuple[float, ...]) -> bool:
-        return not any(pending and active >= 1.0 for pending, active in zip(self._pending, activations, strict=True))
+    def _not_back(self, activations: tuple[float, ...]) -> tuple[str, ...]:
+        """Names of the fully active tasks that are still on their way back."""
+        tasks = zip(self.tasks, self._pending, activations, strict=True)
+        return tuple([task.name for task, pending, active in tasks if pending and active >= 1.0])
 
-    def _met(self, state: RobotState, activations: tuple[float, ...]) -> bool:
-        """Whether every essential and fully active task is on the path, within the tolerance."""
+    def _not_met(self, state: RobotState, activations: tuple[float, ...]) -> tuple[str, ...]:
+        """Names of the essential and fully active tasks that are off the path, by more than the tolerance."""
+        names = []
         for task, active in zip(self.tasks, activations, strict=True):
             if task.essential and active >= 1.0:
                 error = task.error(task.value(state), task.trajectory.sample(self.path_time))
                 if not float(np.linalg.norm(error)) <= self.rules.tolerance:
-                    return False
-        return True
+                    names.append(task.name)
+        return tuple(names)
 
 
 class _Cursor:

@@ -47,6 +47,7 @@ class Tick:
         vectors: Danger vectors (6) at the points, (p, 3).
         path_time: Clock of the tasks' trajectories [s].
         events: Names of the events that the tasks' programs reached at this tick, e.g. ``grip``.
+        waits_for: Names of the tasks that the path waits for: in ``recovering``, or with an event due.
         severity: Of sick sensors, until acknowledged: ``clear``, ``capped`` (speed) or ``stopped``.
         unseen: Names of the spots that cannot be trusted now: nobody knows what is in front of them.
         joint_names: (n,) names used in reports.
@@ -70,6 +71,7 @@ class Tick:
     vectors: NDArray[np.float64] = field(default_factory=_no_vectors)
     path_time: float = 0.0
     events: tuple[str, ...] = ()
+    waits_for: tuple[str, ...] = ()
     severity: str = "clear"
     unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
@@ -115,6 +117,8 @@ class Tick:
         for weight, residuals in self.residuals:
             levels = ", ".join(f"{value:.3g}" for value in residuals)
             lines.append(f"  QP of weight {weight:.3f}: residual per level, highest priority first, {levels}")
+        if self.waits_for:
+            lines.append("  the path waits for: " + ", ".join(self.waits_for))
         if self.binding:
             lines.append("  binding: " + ", ".join(self.binding))
         lines.extend("  note: " + message for message in self.messages)

@@ -235,8 +235,10 @@ def test_recovery_waits_until_the_robot_is_back() -> None:
     world.run(10, DANGEROUS)
     world.push(y=0.05)
     assert set(world.run(500, SAFE, follow=False)) == {RECOVERING}  # it does not move: never recovered
+    assert world.recovery.waits_for == ("position",)  # and says so
     world.pose = world.stopped
     assert world.run(1, SAFE) == [FOLLOWING]
+    assert world.recovery.waits_for == ()
 
 
 def test_nan_danger_suspends() -> None:
@@ -264,6 +266,7 @@ def test_an_event_waits_until_the_tasks_are_met() -> None:
         world.run(1, MEDIUM)
     assert world.events == []
     assert 0.05 - DT <= world.recovery.path_time <= 0.05
+    assert world.recovery.waits_for == ("orientation",)
     world.pose[:3, :3] = np.eye(3)
     world.run(2, SAFE)
     assert world.events == ["0"]
