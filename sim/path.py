@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,8 @@ from qpsafe.sim.choreography import Approach, Choreography
 from qpsafe.sim.fixed import FixedExperiment, Observer
 from qpsafe.sim.log import RunLog
 from qpsafe.sim.plant import Plant
+from qpsafe.sim.programmed import Programmed
 from qpsafe.sim.scene import Scene
-from qpsafe.tasks.program import Program
-from qpsafe.tasks.program_file import load_program
-from qpsafe.tasks.reach import joints_for
 from qpsafe.tick import Tick
 
 #: The bundled path.
@@ -48,7 +45,7 @@ class PathRun:
 
 
 @dataclass
-class PathExperiment(FixedExperiment):
+class PathExperiment(Programmed, FixedExperiment):
     """One run of the second experiment; settings as for the first.
 
     Attributes:
@@ -58,21 +55,6 @@ class PathExperiment(FixedExperiment):
     choreography: Choreography = field(default_factory=lambda: Choreography(SECOND_EXPERIMENT))
     duration: float = 45.0
     program: Path = PROGRAM
-
-    @cached_property
-    def program_text(self) -> str:
-        """What the program's file says."""
-        return self.program.read_text(encoding="utf-8")
-
-    @cached_property
-    def reference(self) -> Program:
-        """The tool's program."""
-        return load_program(self.program, self.robot)
-
-    @property
-    def start(self) -> NDArray[np.float64]:
-        """Joint positions at which the tool is where the program starts (n,) [rad]."""
-        return joints_for(self.robot, "tcp", self.reference.sample(0.0).pose, self.robot.home)
 
     def run_path(self, observer: Observer | None = None) -> PathRun:
         """Run it; see `FixedExperiment.run`."""

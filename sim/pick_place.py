@@ -19,10 +19,8 @@ from qpsafe.sim.fixed import Observer, euler_error, pose_error
 from qpsafe.sim.log import Recorder, RunLog
 from qpsafe.sim.pick_loop import RELEASE, SETTLE, PickEvent, PickLoop, motion
 from qpsafe.sim.pick_people import load_people
+from qpsafe.sim.programmed import Programmed
 from qpsafe.sim.scene import Scene, build_scene
-from qpsafe.tasks.program import Program
-from qpsafe.tasks.program_file import load_program
-from qpsafe.tasks.reach import joints_for
 
 if TYPE_CHECKING:
     from qpsafe.recovery import RecoveryRules
@@ -74,7 +72,7 @@ class PickRun:
 
 
 @dataclass
-class PickPlaceExperiment:
+class PickPlaceExperiment(Programmed):
     """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
 
     Attributes:
@@ -136,21 +134,6 @@ class PickPlaceExperiment:
         """The world, built on first use."""
         people = () if self.story is None else self.story.persons
         return build_scene(self.robot, people=people, furnish=self.cell.furnish)
-
-    @cached_property
-    def program_text(self) -> str:
-        """What the program's file says."""
-        return self.program.read_text(encoding="utf-8")
-
-    @cached_property
-    def reference(self) -> Program:
-        """The tool's program."""
-        return load_program(self.program, self.robot)
-
-    @property
-    def start(self) -> NDArray[np.float64]:
-        """Joint positions at the beginning (n,) [rad]."""
-        return joints_for(self.robot, "tcp", self.reference.sample(0.0).pose, self.robot.home)
 
     def run(self, observer: Observer | None = None) -> PickRun:
         """Run it with the controller, until the last screw lies in the box or `limit` is over.

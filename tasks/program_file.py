@@ -24,23 +24,20 @@ above = 0.1                       # m; 0 by default
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.tasks.lines import line_of
 from qpsafe.tasks.moves import Arc, Dwell, JointMove, JointMoveOfFrame, Line, Move
 from qpsafe.tasks.program import Program
 from qpsafe.tasks.program_tables import ArcSegment, DwellSegment, EventSegment, JointSegment, Point, ProgramFile
 from qpsafe.tasks.reach import UnreachableError, follow, joints_for
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.timing import Rates
+from qpsafe.tasks.toml_text import TomlText
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -64,26 +61,8 @@ def load_program(path: str | Path, robot: Robot) -> Program:
             point, a move to where the frame is already, poses out of reach or past a joint limit, joints too fast, a
             cycle that does not close.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise ProgramError(path, "file", str(problem), "a readable TOML file") from None
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        found = re.search(r"at line (\d+)", str(problem))
-        line = found.group(1) if found else str(len(text.splitlines()))
-        raise ProgramError(f"{path}:{line}", "file", str(problem), "well-formed TOML") from None
-    try:
-        file = ProgramFile.model_validate(table)
-    except ValidationError as problem:
-        first = problem.errors()[0]
-        keys = [key for key in first["loc"] if not (isinstance(key, str) and key in _KINDS)]
-        missing = first["type"] == "missing"
-        value = "nothing" if missing else first["input"]
-        raise _wrong(path, text, keys, value, first["msg"]) from None
-    return _Builder(path, text, file, robot).program()
+    text = TomlText.read(Path(path), ProgramError)
+    return _Builder(text, text.checked(ProgramFile, lambda before, key: key not in _KINDS), robot).program()
 
 
 _KINDS = ("line", "arc", "joint", "dwell", "event")
@@ -92,8 +71,8 @@ _KINDS = ("line", "arc", "joint", "dwell", "event")
 class _Builder:
     """Turns a checked file into moves, following them with the robot's joints."""
 
-    def __init__(self, path: Path, text: str, file: ProgramFile, robot: Robot) -> None:
-        self.path, self.text, self.file, self.robot = path, text, file, robot
+    def __init__(self, text: TomlText, file: ProgramFile, robot: Robot) -> None:
+        self.wrong, self.file, self.robot = text.wrong, file, robot
         if file.frame not in robot.frame_names:
             raise self.wrong(["frame"], file.frame, "one of " + ", ".join(robot.frame_names))
         for name, point in file.points.items():
@@ -143,7 +122,8 @@ class _Builder:
     def move(self, k: int, segment: Any) -> Move:
         if isinstance(segment, DwellSegment):
             return Dwell(self.pose, segment.time)
-        key, robot, frame = ["segment", k, "to"], self.robot, self.file.frame
+        key: list[str | int] = ["segment", k, "to"]
+        robot, frame = self.robot, self.file.frame
         move: Move
         try:
             if isinstance(segment, JointSegment):
@@ -215,13 +195,3 @@ class _Builder:
             except UnreachableError as found:
                 problem = problem or found
         raise self.wrong(keys, name, f"a point that can be reached: {problem}")
-
-    def wrong(self, keys: list, value: object, expected: str) -> ProgramError:
-        return _wrong(self.path, self.text, keys, value, expected)
-
-
-def _wrong(path: Path, text: str, keys: list, value: object, expected: str) -> ProgramError:
-    name = ""
-    for key in keys:
-        name += f"[{key}]" if isinstance(key, int) else f".{key}" if name else str(key)
-    return ProgramError(f"{path}:{line_of(text, keys)}", name, value, expected)

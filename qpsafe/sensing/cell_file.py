@@ -12,15 +12,15 @@ vertices = [[1.0, 0.0, 0.0], [1.0, 0.4, 0.0], [1.4, 0.0, 0.0], [1.4, 0.4, 0.3]] 
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.hulls import Obstacle
+from qpsafe.tasks.toml_text import TomlText
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]
@@ -35,10 +35,16 @@ class _Box(_Table):
     size: _Vector
     centre: _Vector
 
+    def obstacle(self) -> Obstacle:
+        return Obstacle.box(self.name, self.size, self.centre)
+
 
 class _Hull(_Table):
     name: str
     vertices: tuple[_Vector, ...]
+
+    def obstacle(self) -> Obstacle:
+        return Obstacle(self.name, np.array(self.vertices))
 
 
 class _Cell(_Table):
@@ -50,18 +56,16 @@ def load_cell(path: str | Path) -> tuple[Obstacle, ...]:
     """Known obstacles from a file, for `SafetyController(known=...)`.
 
     Raises:
-        ConfigurationError: Names what is wrong, and where.
+        ConfigurationError: Names file, line, key and value of what is wrong.
     """
-    path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigurationError(path, "file", path.name, f"a readable TOML file ({error})") from None
-    try:
-        cell = _Cell.model_validate(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise ConfigurationError(path, key, first["input"], first["msg"]) from None
-    boxes = [Obstacle.box(box.name, box.size, box.centre) for box in cell.box]
-    return (*boxes, *(Obstacle(hull.name, np.array(hull.vertices)) for hull in cell.hull))
+    text = TomlText.read(Path(path))
+    content = text.checked(_Cell)
+    found = []
+    kinds: tuple[tuple[str, tuple[_Box | _Hull, ...]], ...] = (("box", content.box), ("hull", content.hull))
+    for kind, items in kinds:
+        for k, item in enumerate(items):
+            try:
+                found.append(item.obstacle())
+            except ConfigurationError as problem:
+                raise text.wrong((kind, k, problem.key), problem.value, problem.expected) from None
+    return tuple(found)

@@ -34,12 +34,12 @@ def test_boxes_and_hulls(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("[[box]]\nname = 1", "box.0"),
-        (GOOD.replace("size", "sise"), "sise"),
-        (GOOD.replace("0.05", "inf"), "size"),
-        (GOOD.replace("0.05", "-0.05"), "table"),
-        (GOOD.replace("[1.4, 0.4, 0.3]", "[1.4, 0.4, 0.0]"), "ramp"),
-        ("[[box", "TOML"),
+        ("[[box]]\nname = 1", r"cell\.toml:2: box\[0\]\.name = 1"),
+        (GOOD.replace("size", "sise"), r"cell\.toml:2: box\[0\]\.size = 'nothing'"),
+        (GOOD.replace("0.05", "inf"), r"cell\.toml:4: box\[0\]\.size\[2\] = inf"),
+        (GOOD.replace("0.05", "-0.05"), r"cell\.toml:4: box\[0\]\.size = .*-0\.05"),
+        (GOOD.replace("[1.4, 0.4, 0.3]", "[1.4, 0.4, 0.0]"), r"cell\.toml:9: hull\[0\]\.vertices"),
+        ("[[box", r"cell\.toml:1: file = .*TOML"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, text: str, word: str) -> None:
