@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.anatomy import FIRST, SEGMENTS
-from qpsafe.sim.person import Person, two_link
+from qpsafe.sim.limbs import two_link
+from qpsafe.sim.person import Person
 
 Array = NDArray[np.float64]
 

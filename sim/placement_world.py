@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
 from qpsafe.sim.anatomy import SEGMENTS
-from qpsafe.sim.person import axis_quaternions
+from qpsafe.sim.limbs import axis_quaternions
 from qpsafe.sim.surroundings import SCENERY, add_surroundings
 
 if TYPE_CHECKING:

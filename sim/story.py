@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from qpsafe.sim.actor import Actor, StepProblem, Taken
+from qpsafe.sim.actor import Actor
 from qpsafe.sim.person import Person, PersonPose
+from qpsafe.sim.planning import StepProblem, Taken
 from qpsafe.sim.story_steps import PersonTable, StoryTable, WaitStep, WalkStep
 
 __all__ = ["Actor", "StepProblem", "Story", "Taken"]

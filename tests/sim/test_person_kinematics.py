@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.sim.person import SEGMENTS, Board, Foot, Person, two_link
+from qpsafe.sim.limbs import two_link
+from qpsafe.sim.person import SEGMENTS, Board, Foot, Person
 
 place = st.floats(-3.0, 3.0)
 angle = st.floats(-math.pi, math.pi)

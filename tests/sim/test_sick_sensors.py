@@ -8,7 +8,8 @@ import qpsafe
 from qpsafe.sim.choreography import Approach, Choreography
 from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.loop import FixedLoop
-from qpsafe.sim.sick import CASES, run_matrix
+from qpsafe.sim.sick import run_matrix
+from qpsafe.sim.sick_cases import CASES
 
 ROBOT = qpsafe.load_robot("irb140")
 BRIEF = Choreography(
