@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from inspect import Parameter, Signature, signature
 from pathlib import Path
+from threading import Timer
+from time import perf_counter
 from types import ModuleType
 from typing import Any
 from zlib import crc32
@@ -25,9 +28,44 @@ Array = NDArray[np.float64]
 
 # 1/0 = inf as in C; no fastmath, NaN must come through. Without reference counting (`_nrt`), whose atomic counters cost
 # more than the arithmetic here: compiled code may not allocate.
-OPTIONS = {"error_model": "numpy", "_nrt": False}
-inline = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
+OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+_entry: dict[str, Any] = {}
+_inner: dict[str, Any] = {}
+# by numba's own pipeline where it is not known yet: to the same results, but it takes half as long again
+if numba.version_info.short <= (0, 68):
+    from qpsafe.danger.pipeline import EntryCompiler, InnerCompiler
+
+    _entry, _inner = {"pipeline_class": EntryCompiler}, {"pipeline_class": InnerCompiler}
+inline = numba.njit(no_cpython_wrapper=True, **_inner, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
+
+PATIENCE = 1.5  # seconds; loading everything from the cache takes less
+NOTICE = "qpsafe: compiling for this machine, once, takes about 15 s ..."
+
+
+class _Notice:
+    """Says, once, that this is compiling, when it has taken longer than loading does."""
+
+    spent, said = 0.0, False
+
+    def say(self) -> None:
+        self.said = True
+        print(NOTICE, file=sys.stderr, flush=True)
+
+    @contextmanager
+    def expected(self) -> Iterator[None]:
+        begin, timer = perf_counter(), Timer(max(PATIENCE - self.spent, 0.0), self.say)
+        timer.daemon = True
+        if not self.said:
+            timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            self.spent += perf_counter() - begin
+
+
+_notice = _Notice()
 
 
 def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -42,10 +80,12 @@ def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Call
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         if uses:
             function.__qualname__ += f"_{checksum(*uses):08x}"
-        try:
-            return numba.njit(types_, cache=True, no_cfunc_wrapper=True, **OPTIONS)(function)
-        except RuntimeError:  # no directory that numba may write to
-            return numba.njit(types_, no_cfunc_wrapper=True, **OPTIONS)(function)
+        options = {**_entry, **OPTIONS}
+        with _notice.expected():
+            try:
+                return numba.njit(types_, cache=True, **options)(function)
+            except RuntimeError:  # no directory that numba may write to
+                return numba.njit(types_, **options)(function)
 
     return compiled
 

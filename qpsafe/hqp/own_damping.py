@@ -19,23 +19,23 @@ from __future__ import annotations
 
 from math import sqrt
 
-from qpsafe.hqp.own_linear import jit
+from qpsafe.danger.compiled import inline
 from qpsafe.hqp.own_state import State
 
 OFF, WITHOUT, WITH = 0, 1, 2  # what to do with nearly singular directions
 
 
-@jit
+@inline
 def separate(s: State, first: int, count: int, start: int) -> None:
     """Mix the rows of an equality level orthogonally until their images in the freedom left are orthogonal.
 
     One-sided Jacobi rotations of rows and targets: s.F becomes diag(σ) Vᵀ, and the least squares stay the same.
     """
-    n = s.x.shape[0]
-    k, F, A = n - start, s.F, s.A
+    A, low, high, G, F, n = s.A, s.low, s.high, s.G, s.F, s.x.shape[0]
+    k = n - start
     for j in range(k):
         for a in range(count):
-            F[a, j] = s.G[start + j, n + a]
+            F[a, j] = G[start + j, n + a]
     for _sweep in range(12):
         turned = False
         for a in range(count - 1):
@@ -59,55 +59,55 @@ def separate(s: State, first: int, count: int, start: int) -> None:
                     p, q = A[first + a, i], A[first + b, i]
                     A[first + a, i], A[first + b, i] = cosine * p - sine * q, sine * p + cosine * q
                 c, d = n + first + a, n + first + b
-                p, q = s.low[c], s.low[d]
-                s.low[c], s.low[d] = cosine * p - sine * q, sine * p + cosine * q
-                s.high[c], s.high[d] = s.low[c], s.low[d]
+                p, q = low[c], low[d]
+                low[c], low[d] = cosine * p - sine * q, sine * p + cosine * q
+                high[c], high[d] = low[c], low[d]
         if not turned:
             break
     for j in range(k):
         for a in range(count):
-            s.G[start + j, n + a] = F[a, j]
+            G[start + j, n + a] = F[a, j]
 
 
-@jit
+@inline
 def damp(s: State, mode: int, first: int, count: int, start: int, damping: float, tolerance: float) -> int:
     """Leave out (WITHOUT) or resist (WITH) the directions of the level with tolerance < σ < damping.
 
     Returns:
         How many rows count now; s.flags[0] counts the directions found.
     """
-    n = s.x.shape[0]
+    A, G, F, chosen, flags, n = s.A, s.G, s.F, s.chosen, s.flags, s.x.shape[0]
     k, m = n - start, count
     separate(s, first, count, start)
     left, added = 0, 0
     for a in range(m):
         square = 0.0
         for j in range(k):
-            square += s.F[a, j] * s.F[a, j]
+            square += F[a, j] * F[a, j]
         sigma = sqrt(square)
         near = tolerance < sigma < damping and added < n
         if near:
-            s.flags[0] += 1
+            flags[0] += 1
         if near and mode == WITHOUT:
             continue
-        s.chosen[left] = a
+        chosen[left] = a
         left += 1
         if near:
             factor = sqrt(damping * damping - sigma * sigma) / sigma
-            row = s.A.shape[0] - n + added
+            row = A.shape[0] - n + added
             target = 0.0
             for i in range(n):
                 value = 0.0
                 for j in range(k):
-                    value += s.F[a, j] * s.G[start + j, i]
-                s.A[row, i] = factor * value
+                    value += F[a, j] * G[start + j, i]
+                A[row, i] = factor * value
                 target += factor * value * s.reference[i]
             for j in range(k):
-                s.G[start + j, n + m + added] = factor * s.F[a, j]
+                G[start + j, n + m + added] = factor * F[a, j]
             s.low[n + row] = s.high[n + row] = target
             s.side[n + row] = 2
             added += 1
     for a in range(added):
-        s.chosen[left] = m + a
+        chosen[left] = m + a
         left += 1
     return left

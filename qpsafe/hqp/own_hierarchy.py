@@ -22,9 +22,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from qpsafe.danger.compiled import inline
+from qpsafe.danger.reference import by_reference
 from qpsafe.hqp.own_damping import OFF, WITH, WITHOUT
 from qpsafe.hqp.own_level import minimise_level
-from qpsafe.hqp.own_linear import Array, Index, dot, fuse, jit
+from qpsafe.hqp.own_linear import Array, Index, dot
 from qpsafe.hqp.own_state import ABSENT, LOCKED, State, cut, load_box, load_rows
 
 # codes in info[0]
@@ -32,7 +34,6 @@ OK, ROWS, TURNS, DATA, LIMITS, INEXACT, FAILED = range(7)
 HEADER = 3  # info = [code, turns, where, then one number a joint and row]
 
 
-@fuse
 def run(
     floats: Array,
     integers: Index,
@@ -69,7 +70,7 @@ def run(
         damping: singular values below it are damped, see `own_damping`; 0 for none.
     """
     n, rows, levels = box_low.shape[0], rows_A.shape[0], ends.shape[0]
-    s = cut(floats, integers, x, rows + 2 * n, m + n)
+    s = by_reference(cut(floats, integers, x, rows + 2 * n, m + n))
     for mode in range(WITHOUT, WITH + 1):  # one pass is enough unless damping finds something to do
         for i in range(n):
             s.reference[i] = x[i]
@@ -108,38 +109,38 @@ def run(
     check(s, info, min(first, rows), rows)
 
 
-@jit
+@inline
 def violated(s: State, rows: int) -> bool:
     """Whether one of the first rows is violated at x by more than rounding."""
-    n = s.x.shape[0]
+    low, high, kept, n = s.low, s.high, s.kept, s.x.shape[0]
     found = False
     for row in range(rows):
-        c, slack = n + row, 1e-8 * max(1.0, abs(s.kept[row]))
+        c, slack = n + row, 1e-8 * max(1.0, abs(kept[row]))
         # a row that is met has become a constraint; a violated one stays what its level asked for
-        found = found or s.kept[row] > s.high[c] + slack or s.kept[row] < s.low[c] - slack
+        found = found or kept[row] > high[c] + slack or kept[row] < low[c] - slack
     return found
 
 
-@jit
+@inline
 def check(s: State, info: Index, solved: int, rows: int) -> None:
     """Judge the result: sets the code if a solved row has moved since its level was left, or x is not in the box."""
-    n = s.x.shape[0]
+    A, low, high, kept, kind, side, x, n = s.A, s.low, s.high, s.kept, s.kind, s.side, s.x, s.x.shape[0]
     for row in range(solved):
         c = n + row
         value, size = 0.0, 1.0
         for i in range(n):
-            value += s.A[row, i] * s.x[i]
-            size += abs(s.A[row, i] * s.x[i])
-        change = abs(value - s.kept[row]) if s.kind[c] == ABSENT else max(value - s.high[c], s.low[c] - value)
+            value += A[row, i] * x[i]
+            size += abs(A[row, i] * x[i])
+        change = abs(value - kept[row]) if kind[c] == ABSENT else max(value - high[c], low[c] - value)
         if not change <= 1e-8 * size:
             info[0], info[2] = INEXACT, row
     fine = True
     for c in range(n + rows):
         if c < n:
-            fine = fine and s.low[c] <= s.x[c] <= s.high[c] and abs(s.x[c]) < np.inf
-        if s.kind[c] >= LOCKED:
-            info[HEADER + c] = s.side[c] * (1 + s.kind[c] - LOCKED)
+            fine = fine and low[c] <= x[c] <= high[c] and abs(x[c]) < np.inf
+        if kind[c] >= LOCKED:
+            info[HEADER + c] = side[c] * (1 + kind[c] - LOCKED)
     if not fine:
         info[0] = FAILED
         for i in range(n):
-            s.x[i] = min(max(0.0, s.low[i]), s.high[i])
+            x[i] = min(max(0.0, low[i]), high[i])

@@ -21,8 +21,9 @@ from math import sqrt
 
 import numpy as np
 
+from qpsafe.danger.compiled import inline
 from qpsafe.hqp.own_damping import OFF, damp
-from qpsafe.hqp.own_linear import along, dot, factorise, fuse, image, jit, least_squares, reflect, unturn
+from qpsafe.hqp.own_linear import along, dot, factorise, image, least_squares, reflect, unturn
 from qpsafe.hqp.own_rules import multipliers, ratio_test, wrong_way
 from qpsafe.hqp.own_state import FREE, LOCKED, State, hold, release
 
@@ -32,38 +33,38 @@ ROUNDING = 2e-14  # relative size below which a wrong sign of a multiplier is ro
 STRICT = 1e-9  # relative size above which a multiplier is certainly not zero
 
 
-@jit
+@inline
 def choose(s: State, first: int, last: int) -> tuple[int, int, float]:
     """Which rows count at the start. Returns their number, the number of inequalities, and the norm of the level."""
-    n = s.x.shape[0]
+    A, low, high, side, chosen, x, n = s.A, s.low, s.high, s.side, s.chosen, s.x, s.x.shape[0]
     count, inequalities, square = 0, 0, 0.0
     for row in range(first, last):
         c = n + row
-        square += image(s.A, row, s.A, row)
-        if s.low[c] == s.high[c]:
-            s.side[c] = 2
+        square += image(A, row, A, row)
+        if low[c] == high[c]:
+            side[c] = 2
         else:
-            value = dot(s.A, row, s.x)
-            s.side[c] = 1 if value > s.high[c] else -1 if value < s.low[c] else 0
+            value = dot(A, row, x)
+            side[c] = 1 if value > high[c] else -1 if value < low[c] else 0
             inequalities += 1
-        if s.side[c] != 0:
-            s.chosen[count] = row - first
+        if side[c] != 0:
+            chosen[count] = row - first
             count += 1
     return count, inequalities, sqrt(square)
 
 
-@jit
+@inline
 def residuals(s: State, first: int, last: int, count: int) -> float:
     """r = target - A x of the chosen rows; returns the size of the numbers they are the difference of."""
-    n = s.x.shape[0]
-    spare = s.A.shape[0] - n - (last - first)  # rows beyond those of the level are rows of damping
+    A, low, high, side, chosen, x, n = s.A, s.low, s.high, s.side, s.chosen, s.x, s.x.shape[0]
+    spare = A.shape[0] - n - (last - first)  # rows beyond those of the level are rows of damping
     size = 0.0
     for a in range(count):
-        row = s.chosen[a] + (first if first + s.chosen[a] < last else spare)
-        target = s.low[n + row] if s.side[n + row] == -1 else s.high[n + row]
+        row = chosen[a] + (first if first + chosen[a] < last else spare)
+        target = low[n + row] if side[n + row] == -1 else high[n + row]
         value, magnitude = 0.0, abs(target)
         for i in range(n):
-            term = s.A[row, i] * s.x[i]
+            term = A[row, i] * x[i]
             value += term
             magnitude += abs(term)
         s.r[a] = target - value
@@ -71,18 +72,18 @@ def residuals(s: State, first: int, last: int, count: int) -> float:
     return size
 
 
-@jit
+@inline
 def load_factor(s: State, start: int, w: int, count: int, tolerance: float) -> int:
     """Factorise the images of N under the chosen rows; returns the rank."""
-    n = s.x.shape[0]
+    G, F, chosen, n = s.G, s.F, s.chosen, s.x.shape[0]
     k = n - start - w
     for j in range(k):
         for a in range(count):
-            s.F[a, j] = s.G[start + w + j, n + s.chosen[a]]
-    return factorise(s.F, s.chosen, count, k, s.tau, s.diagonal, tolerance)
+            F[a, j] = G[start + w + j, n + chosen[a]]
+    return factorise(F, chosen, count, k, s.tau, s.diagonal, tolerance)
 
 
-@fuse
+@inline
 def minimise_level(
     s: State, level: int, first: int, last: int, start: int, limit: int, mode: int, damping: float
 ) -> tuple[int, int]:
@@ -101,18 +102,20 @@ def minimise_level(
     Returns:
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
     """
-    n, m = s.x.shape[0], last - first
+    A, low, high, kind, side, x, G = s.A, s.low, s.high, s.kind, s.side, s.x, s.G
+    working, chosen, d, r, u = s.working, s.chosen, s.d, s.r, s.u
+    n, m = x.shape[0], last - first
     count, inequalities, norm = choose(s, first, last)
-    scale = s.A[first, 0]
+    scale = A[first, 0]
     uniform = m == n and inequalities == 0 and scale > 0.0  # A = scale I: a projection, the usual closing level
     for a in range(m):
         for i in range(n):
-            uniform = uniform and s.A[first + a, i] == (scale if i == a else 0.0)
+            uniform = uniform and A[first + a, i] == (scale if i == a else 0.0)
     width = n if uniform else n + m
     if not uniform:
         for j in range(start, n):
             for a in range(m):
-                s.G[j, n + a] = image(s.G, j, s.A, first + a)
+                G[j, n + a] = image(G, j, A, first + a)
 
     tolerance = RANK * norm
     if mode != OFF and inequalities == 0 and not uniform:
@@ -130,35 +133,35 @@ def minimise_level(
             rank = n - base
             size = residuals(s, first, last, count)
             for j in range(rank):
-                s.u[j] = along(s.G, base + j, s.r, n) / scale
+                u[j] = along(G, base + j, r, n) / scale
         else:
             rank = load_factor(s, start, w, count, tolerance)
             size = residuals(s, first, last, count)  # after the pivoting, which permutes the rows
-            least_squares(s.F, count, rank, s.diagonal, s.r, s.u)
-            unturn(s.F, s.tau, rank, n - base, s.u)
+            least_squares(s.F, count, rank, s.diagonal, r, u)
+            unturn(s.F, s.tau, rank, n - base, u)
         # go until a constraint is met
         met = -1
         if rank > 0:
             for i in range(width):
-                s.d[i] = 0.0
+                d[i] = 0.0
             for j in range(n - base):
                 for i in range(width):
-                    s.d[i] += s.u[j] * s.G[base + j, i]
+                    d[i] += u[j] * G[base + j, i]
             alpha, met = ratio_test(s, first, last, turn > BLAND)
             for i in range(n):
-                s.x[i] = min(max(s.x[i] + alpha * s.d[i], s.low[i]), s.high[i])
+                x[i] = min(max(x[i] + alpha * d[i], low[i]), high[i])
             for j in range(w):
-                c = s.working[j]
+                c = working[j]
                 if c < n:
-                    s.x[c] = s.low[c] if s.side[c] < 0 else s.high[c]
+                    x[c] = low[c] if side[c] < 0 else high[c]
         if met >= 0:
             if met < n:
-                s.x[met] = s.low[met] if s.side[met] < 0 else s.high[met]
+                x[met] = low[met] if side[met] < 0 else high[met]
             if met < n + first:
                 hold(s, width, start, w, met)
                 w += 1
             else:
-                s.chosen[count] = met - n - first
+                chosen[count] = met - n - first
                 count += 1
             continue
         if w == 0 and inequalities == 0:
@@ -172,37 +175,37 @@ def minimise_level(
             release(s, width, start, w, gone)
             w -= 1
         else:
-            s.side[n + first + s.chosen[gone - w]] = 0
+            side[n + first + chosen[gone - w]] = 0
             count -= 1
-            s.chosen[gone - w] = s.chosen[count]
+            chosen[gone - w] = chosen[count]
 
     # lock what is active in every optimum, release the rest
     released = False
     for j in range(w - 1, -1, -1):
-        c = s.working[j]
-        if -s.u[j] * s.side[c] > STRICT * norm * size / pivot:
-            s.kind[c] = LOCKED + level
+        c = working[j]
+        if -u[j] * side[c] > STRICT * norm * size / pivot:
+            kind[c] = LOCKED + level
         elif not uniform:
             release(s, width, start, w, j)
             w -= 1
             released = True
     if inequalities > 0:
         for a in range(count - 1, -1, -1):
-            c = n + first + s.chosen[a]
-            if s.side[c] != 2 and abs(s.r[a]) <= STRICT * size:
-                s.side[c] = 0
+            c = n + first + chosen[a]
+            if side[c] != 2 and abs(r[a]) <= STRICT * size:
+                side[c] = 0
                 count -= 1
-                s.chosen[a] = s.chosen[count]
+                chosen[a] = chosen[count]
                 released = True
         for row in range(first, last):
             c = n + row
-            if s.side[c] == 0:
-                value = dot(s.A, row, s.x)
-                s.low[c], s.high[c], s.kind[c] = min(s.low[c], value), max(s.high[c], value), FREE
+            if side[c] == 0:
+                value = dot(A, row, x)
+                low[c], high[c], kind[c] = min(low[c], value), max(high[c], value), FREE
     if uniform:
         return n, int(turn)
     if released:
         rank = load_factor(s, start, w, count, tolerance)
     for step in range(rank):
-        reflect(s.G, start + w + step, n, s.F, step, step, s.tau[step], s.scratch)
+        reflect(G, start + w + step, n, s.F, step, step, s.tau[step], s.scratch)
     return int(start + w + rank), int(turn)

@@ -16,22 +16,16 @@ from __future__ import annotations
 
 from math import copysign, sqrt
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from qpsafe.danger.compiled import inline
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-# Compiled without reference counting (`_nrt`): atomic counters on arrays cost more than the arithmetic here. Such a
-# function may neither allocate nor return an array. Inner functions are never called from Python and need no wrapper
-# for it.
-OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-jit = numba.njit(no_cpython_wrapper=True, **OPTIONS)
-fuse = numba.njit(no_cpython_wrapper=True, inline="always", **OPTIONS)  # saves compiling the caller's callees twice
 
-
-@jit
+@inline
 def dot(A: Array, row: int, x: Array) -> float:
     """A[row] · x, over the columns of A."""
     value = 0.0
@@ -40,7 +34,7 @@ def dot(A: Array, row: int, x: Array) -> float:
     return value
 
 
-@jit
+@inline
 def along(G: Array, j: int, r: Array, n: int) -> float:
     """G[j, :n] · r."""
     value = 0.0
@@ -49,7 +43,7 @@ def along(G: Array, j: int, r: Array, n: int) -> float:
     return value
 
 
-@jit
+@inline
 def image(G: Array, j: int, A: Array, row: int) -> float:
     """G[j] · A[row], over the columns of A."""
     value = 0.0
@@ -58,7 +52,7 @@ def image(G: Array, j: int, A: Array, row: int) -> float:
     return value
 
 
-@jit
+@inline
 def householder(V: Array, row: int, first: int, last: int) -> tuple[float, float]:
     """Reflection I - τ v vᵀ that turns V[row, first:last] into (value, 0, ..., 0).
 
@@ -75,7 +69,7 @@ def householder(V: Array, row: int, first: int, last: int) -> tuple[float, float
     return value, tau
 
 
-@jit
+@inline
 def reflect(G: Array, first: int, width: int, V: Array, row: int, column: int, tau: float, scratch: Array) -> None:
     """Turn rows first.. of G, over `width` columns, by I - τ v vᵀ with v = V[row, column:]."""
     n = G.shape[0]
@@ -91,7 +85,7 @@ def reflect(G: Array, first: int, width: int, V: Array, row: int, column: int, t
             G[j, i] -= factor * scratch[i]
 
 
-@jit
+@inline
 def factorise(F: Array, chosen: Index, count: int, k: int, tau: Array, diagonal: Array, tolerance: float) -> int:
     """Pivoted Householder factorisation F = L Q of a wide or tall matrix, in place: L lower trapezoidal, Q orthogonal.
 
@@ -134,7 +128,7 @@ def factorise(F: Array, chosen: Index, count: int, k: int, tau: Array, diagonal:
     return rank
 
 
-@jit
+@inline
 def least_squares(F: Array, count: int, rank: int, diagonal: Array, r: Array, u: Array) -> None:
     """u = argmin ||L u - r|| for the L of [`factorise`][qpsafe.hqp.own_linear.factorise].
 
@@ -178,7 +172,7 @@ def least_squares(F: Array, count: int, rank: int, diagonal: Array, r: Array, u:
         u[j] = s / u[j]
 
 
-@jit
+@inline
 def unturn(F: Array, tau: Array, rank: int, k: int, p: Array) -> None:
     """p = Qᵀ [u; 0] for p[:rank] = u and the Q of [`factorise`][qpsafe.hqp.own_linear.factorise]."""
     for j in range(rank, k):
@@ -192,7 +186,7 @@ def unturn(F: Array, tau: Array, rank: int, k: int, p: Array) -> None:
             p[j] -= s * F[step, j]
 
 
-@jit
+@inline
 def remove_column(G: Array, width: int, R: Array, start: int, w: int, gone: int) -> None:
     """Take working constraint `gone` out of the triangle R, (w, w), and give its direction back to N.
 

@@ -13,18 +13,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.danger.compiled import inline
 from qpsafe.hqp.own_hierarchy import HEADER
-from qpsafe.hqp.own_linear import jit
 from qpsafe.hqp.own_solver import solve_compiled as solve
 from qpsafe.hqp.own_state import floats_of, workspace
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_count_floats = jit(floats_of)
+_count_floats = inline(floats_of)
 
 
-@jit
+@inline
 def solve_regimes(
     floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index, A: Array, b: Array,
     weights: Array, qd0: Array, lower: Array, upper: Array, damping: float, x: Array, info: Index, qd: Array,

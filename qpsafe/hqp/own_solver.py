@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
-from threading import Timer
+from collections.abc import Sequence
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import checksum, linked
+from qpsafe.danger.compiled import entry, linked
 from qpsafe.hqp import own_damping, own_hierarchy, own_level, own_linear, own_rules, own_state
 from qpsafe.hqp.own_hierarchy import HEADER, run
 from qpsafe.hqp.own_state import workspace
@@ -35,34 +32,7 @@ _SIGNATURE = types.void(
 
 #: All the code that goes into the kernel.
 MODULES = (own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
-
-
-def _compile(key: int) -> Callable[..., None]:
-    """Compile the solver, or load it from the cache.
-
-    The key is the state of the sources. numba's cache looks at the file and the free variables of this function only:
-    without the key it would go on using what it compiled before another file changed.
-    """
-
-    def solve_one(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping):  # type: ignore[no-untyped-def]
-        if key >= 0:
-            run(floats, integers, m, x, info, A, low, high, weight, ends, box_low, box_high, hard, damping)
-
-    notice = Timer(
-        1.5, print, ["qpsafe: compiling for this machine, once, takes up to half a minute ..."], {"file": sys.stderr}
-    )
-    notice.daemon = True
-    notice.start()
-    try:
-        return numba.njit(_SIGNATURE, cache=True, **own_linear.OPTIONS)(solve_one)
-    except RuntimeError:  # no directory that numba may write to
-        return numba.njit(_SIGNATURE, **own_linear.OPTIONS)(solve_one)
-    finally:
-        notice.cancel()
-
-
-SOURCES = checksum(*MODULES)
-solve = _compile(SOURCES)
+solve = entry(_SIGNATURE, *MODULES)(run)
 solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""
 _NO_WEIGHTS = np.empty(0)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from qpsafe.hqp.own_linear import Array, Index, householder, image, jit, reflect, remove_column
+from qpsafe.danger.compiled import inline
+from qpsafe.hqp.own_linear import Array, Index, householder, image, reflect, remove_column
 
 HUGE = 1e60  # numbers beyond cannot be squared safely: unusable in A, no bound as bounds
 
@@ -71,7 +72,7 @@ def floats_of(n: int, rows: int, m: int) -> int:
     return rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 3 * n
 
 
-@jit
+@inline
 def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
     """The arrays of one solve, cut from two blocks: each allocation would cost as much as a factorisation."""
     n = x.shape[0]
@@ -90,38 +91,38 @@ def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
     )  # fmt: skip
 
 
-@jit
+@inline
 def load_box(s: State, box_low: Array, box_high: Array) -> int:
     """Set the box, the start x and the basis, fixed joints first. Returns how many are fixed, -1 for a bad box.
 
     Every comparison is written so that NaN fails it.
     """
-    n = s.x.shape[0]
+    low, high, kind, x, G, n = s.low, s.high, s.kind, s.x, s.G, s.x.shape[0]
     good = True
     front, back = 0, n
     for i in range(n):
         if box_low[i] <= box_high[i] and box_low[i] < HUGE and box_high[i] > -HUGE:
-            s.low[i] = box_low[i] if box_low[i] > -HUGE else -np.inf
-            s.high[i] = box_high[i] if box_high[i] < HUGE else np.inf
-            s.x[i] = min(max(0.0, s.low[i]), s.high[i])
+            low[i] = box_low[i] if box_low[i] > -HUGE else -np.inf
+            high[i] = box_high[i] if box_high[i] < HUGE else np.inf
+            x[i] = min(max(0.0, low[i]), high[i])
         else:
             good = False
-            s.x[i] = 0.0
-        if s.low[i] == s.high[i]:
-            s.G[front, i] = 1.0
-            s.kind[i] = LOCKED - 1
+            x[i] = 0.0
+        if low[i] == high[i]:
+            G[front, i] = 1.0
+            kind[i] = LOCKED - 1
             front += 1
         else:
             back -= 1
-            s.G[back, i] = 1.0
-            s.kind[i] = FREE
+            G[back, i] = 1.0
+            kind[i] = FREE
     return front if good else -1
 
 
-@jit
+@inline
 def load_rows(s: State, A: Array, low: Array, high: Array, weight: Array, ends: Index) -> int:
     """Copy the rows times the roots of their weights, and the closing identity. Returns the first bad level."""
-    n, rows = s.x.shape[0], A.shape[0]
+    own_A, own_low, own_high, n, rows = s.A, s.low, s.high, s.x.shape[0], A.shape[0]
     weighted = weight.shape[0] > 0
     for level in range(ends.shape[0]):
         first = ends[level - 1] if level > 0 else 0
@@ -134,35 +135,36 @@ def load_rows(s: State, A: Array, low: Array, high: Array, weight: Array, ends: 
                 root = sqrt(weight[row])
             for i in range(n):
                 good = good and abs(A[row, i]) < HUGE
-                s.A[row, i] = root * A[row, i]
+                own_A[row, i] = root * A[row, i]
             if not good:
                 return level
-            s.low[c] = root * low[row] if low[row] > -HUGE else -np.inf
-            s.high[c] = root * high[row] if high[row] < HUGE else np.inf
+            own_low[c] = root * low[row] if low[row] > -HUGE else -np.inf
+            own_high[c] = root * high[row] if high[row] < HUGE else np.inf
     for i in range(n):
-        s.A[rows + i, i] = 1.0
-        s.low[n + rows + i] = s.high[n + rows + i] = 0.0
+        own_A[rows + i, i] = 1.0
+        own_low[n + rows + i] = own_high[n + rows + i] = 0.0
     return int(ends.shape[0])
 
 
-@jit
+@inline
 def hold(s: State, width: int, start: int, w: int, c: int) -> None:
     """Make constraint c working number w: its direction in N becomes the last of Y."""
-    n = s.x.shape[0]
+    A, G, R, F, working, kind, n = s.A, s.G, s.R, s.F, s.working, s.kind, s.x.shape[0]
     for j in range(n - start):
-        s.F[0, j] = s.G[start + j, c] if c < n else image(s.G, start + j, s.A, c - n)
+        F[0, j] = G[start + j, c] if c < n else image(G, start + j, A, c - n)
     for j in range(w):
-        s.R[j, w] = s.F[0, j]
-    s.R[w, w], tau = householder(s.F, 0, w, n - start)
-    reflect(s.G, start + w, width, s.F, 0, w, tau, s.scratch)
-    s.working[w] = c
-    s.kind[c] = WORKING
+        R[j, w] = F[0, j]
+    R[w, w], tau = householder(F, 0, w, n - start)
+    reflect(G, start + w, width, F, 0, w, tau, s.scratch)
+    working[w] = c
+    kind[c] = WORKING
 
 
-@jit
+@inline
 def release(s: State, width: int, start: int, w: int, j: int) -> None:
     """Give working constraint number j of w back."""
-    s.kind[s.working[j]] = FREE
+    working = s.working
+    s.kind[working[j]] = FREE
     remove_column(s.G, width, s.R, start, w, j)
     for l in range(j, w - 1):
-        s.working[l] = s.working[l + 1]
+        working[l] = working[l + 1]
