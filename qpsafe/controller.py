@@ -22,6 +22,7 @@ from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.reference import JointReference
 from qpsafe.resolve import Resolved, judged, resolve
 from qpsafe.returns import GentleLimits
+from qpsafe.robot.state import RobotState
 from qpsafe.sense import sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
@@ -33,7 +34,6 @@ from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
 #: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint, tuned on the first experiment.
@@ -204,20 +204,19 @@ class SafetyController:
         if not self._active:  # the commanded configuration starts where the robot is
             here, _ = as_joint_position(q, self.robot), as_joint_velocity(qd, self.robot)
             self._q, self._active = np.array(here), True
+            self._q.flags.writeable = False
             self._qd = self._qd_before = np.zeros(self.robot.nq)
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        quick = (
-            None if self.barrier or points is not None else self._quick.sense(self.sensing, self.field, self.evasion)
-        )
-        seen = None if quick is None else quick(q, qd, distances, ages)
+        parts = self.sensing, self.field, self.evasion
+        seen = None if self.barrier else self._quick.sensed(q, qd, distances, points, ages, *parts)
         if seen is None:
-            seen = sense(self.robot, q, qd, distances, points, ages, self.sensing, self.field, self.evasion)
+            seen = sense(self.robot, q, qd, distances, points, ages, *parts)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self.activation.at(cdf_n)
-        commanded = self.robot.at(self._q)
+        commanded = RobotState(self.robot, self._q)
         samples = self.recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
@@ -291,6 +290,7 @@ class SafetyController:
         """Integrate; the reference's arrays are nobody else's."""
         self._qd_before, self._qd = self._qd, command.copy()
         self._q = self._q + command * self.dt
+        self._q.flags.writeable = False  # tasks of any kind will see it
         return JointReference(self._seq, self._seq * self.dt, self._q.copy(), command, self._active)
 
     def _errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:

@@ -78,12 +78,17 @@ def sense(
 
     # danger (1)-(6); its vectors summed per link (8), as virtual torque (14), (15), as evasive velocity (16)
     danger, vectors, torque, cdf_n = push(field, measured, wire, seen.points, seen.links, seen.velocities)
-    _check(cdf_n)
+    check_danger(cdf_n)
     qd0 = evasion.step(torque).copy()
     return Sensed(seen.points, seen.links, vectors, cdf_n, qd0, seen.notes, seen.capped, danger, measured)
 
 
-def _check(cdf_n: float) -> None:
+def check_danger(cdf_n: float) -> None:
+    """Refuse danger that is not finite.
+
+    Raises:
+        BadInput: It is not.
+    """
     if not isfinite(cdf_n):  # never into the filter, which remembers
         raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
 
@@ -138,6 +143,6 @@ class QuickSense:
         severity, too_many, notes = sensing.take(dead, out)
         if too_many:
             raise BadInput("; ".join(notes))
-        _check(cdf_n)
+        check_danger(cdf_n)
         evasion.velocity = qd0
         return Sensed(points[:count], links[:count], vectors[:count], cdf_n, qd0.copy(), notes, severity != CLEAR)

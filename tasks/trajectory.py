@@ -94,10 +94,12 @@ class FixedPose:
 
     def __init__(self, pose: ArrayLike) -> None:
         self.pose = checked_pose("FixedPose", "pose", pose)
+        self._sample = Sample(self.pose, np.zeros(6))
+        self._sample.twist.flags.writeable = False
 
     def sample(self, t: float) -> Sample:
         """The same pose at every time, at rest."""
-        return Sample(self.pose, np.zeros(6))
+        return self._sample
 
 
 class FixedJoints:

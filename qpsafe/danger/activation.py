@@ -97,6 +97,7 @@ class Activation:
         self._counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
         n = len(self.levels)
         self._names = REGIME_NAMES.get(n, ("high", *(f"medium-{kept}" for kept in range(1, n)), "low"))
+        self._calm = Switching((1.0,) * n, (1.0,) * len(self.thresholds), self._names[-1])
         for k in range(len(self.thresholds) - 1):
             upper, lower = self.thresholds[k], self.thresholds[k + 1]
             if lower != upper and lower.end > upper.start:
@@ -129,6 +130,8 @@ class Activation:
         """Switches, activations and the regime's name, in one pass."""
         if type(self) is not Activation:
             return Switching(self.switches(cdf_n), self.activations(cdf_n), self.regime(cdf_n))
+        if cdf_n <= self.levels[-1].start:  # below the lowest threshold
+            return self._calm
         switches, activations = [], []
         product, kept = 1.0, 0
         for threshold, count in zip(self.levels, self._counts, strict=True):

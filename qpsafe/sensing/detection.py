@@ -10,6 +10,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, Vector, add, dot, entry, inline, readable, row
 from qpsafe.sensing.health import CLEAR
 
@@ -155,7 +156,7 @@ def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
         raise BadInput(f"points have shape {points.shape}, expected (p, 3)")
     points = points.copy()  # they go into the tick
     links = np.empty(len(points), dtype=np.int64)
-    if not _nearest(points, wire.starts, wire.ends, links):
+    if not find_nearest(points, wire.starts, wire.ends, links):
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         raise BadInput("points are not finite: number " + ", ".join(str(i) for i in bad))
     return Detection(points, links)
@@ -167,7 +168,7 @@ def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
     Links share their ends, so that is no rare case: rounding must not decide it.
     """
     links = np.empty(len(points), dtype=np.int64)
-    _nearest(points, wire.starts, wire.ends, links)
+    find_nearest(points, wire.starts, wire.ends, links)
     return links
 
 
@@ -179,8 +180,8 @@ def _distance2(p: Vector, r0: Vector, r1: Vector) -> float:
     return dot(n, n)
 
 
-@entry(types.boolean(readable(2), readable(2), readable(2), types.int64[::1]))
-def _nearest(points: Array, r0: Array, r1: Array, links: Array) -> bool:
+@entry(types.boolean(readable(2), readable(2), readable(2), types.int64[::1]), compiled)
+def find_nearest(points: Array, r0: Array, r1: Array, links: Array) -> bool:
     """Fill the links; returns whether all points are finite."""
     good = True
     for i in range(points.shape[0]):
