@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from qpsafe.laws.problem import Law
+    from qpsafe.sim.report import Check
 
 
 class LawName(StrEnum):
@@ -80,6 +81,36 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
     )
     with Progress(*columns, console=screen) as progress:
         yield progress
+
+
+def show_checks(title: str, checks: Sequence[Check], screen: Console) -> None:
+    """Print what was measured beside what was promised."""
+    from rich.table import Table
+
+    table = Table(title=title)
+    for heading in ("", "", "measured", "promised"):
+        table.add_column(heading, overflow="fold")
+    for check in checks:
+        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
+        table.add_row(mark, check.name, check.measured, check.promised)
+    screen.print(table)
+
+
+def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], screen: Console, as_json: bool) -> None:
+    """Print results of cases, as a table or as JSON.
+
+    Raises:
+        typer.Exit: With code 1, a case was not kept.
+    """
+    import typer
+
+    good = all(result.kept for result in results)
+    if as_json:
+        print_json({"good": good, "cases": [result._asdict() | {"kept": result.kept} for result in results]})
+    else:
+        show(results, screen)
+    if not good:
+        raise typer.Exit(1)
 
 
 def print_json(value: Any) -> None:

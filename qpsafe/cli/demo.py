@@ -18,6 +18,7 @@ from qpsafe.cli.common import (
     make_law,
     print_json,
     progress_bar,
+    show_checks,
     write_text,
 )
 from qpsafe.cli.demo_fast import fast_person
@@ -241,13 +242,7 @@ def show(report: Report, title: str, screen: Console) -> None:
             table.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
         screen.print(table)
 
-    table = Table(title="What the run should show")
-    for heading in ("", "", "measured", "promised"):
-        table.add_column(heading, overflow="fold")
-    for check in report.checks:
-        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
-        table.add_row(mark, check.name, check.measured, check.promised)
-    screen.print(table)
+    show_checks("What the run should show", report.checks, screen)
     position, orientation = report.tracking
     screen.print(
         f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.common import console, print_json, progress_bar, show_checks, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -139,10 +139,4 @@ def show(found: dict[str, PathFigures], checks: list[Check], screen: Console) ->
     for label, text in rows:
         table.add_row(label, *(text(item) for item in found.values()))
     screen.print(table)
-    table = Table(title="What the runs should show")
-    for heading in ("", "", "measured", "promised"):
-        table.add_column(heading, overflow="fold")
-    for check in checks:
-        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
-        table.add_row(mark, check.name, check.measured, check.promised)
-    screen.print(table)
+    show_checks("What the runs should show", checks, screen)

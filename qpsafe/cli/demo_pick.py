@@ -17,6 +17,7 @@ from qpsafe.cli.common import (
     make_law,
     print_json,
     progress_bar,
+    show_checks,
     write_text,
 )
 
@@ -169,13 +170,7 @@ def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check
             f"range {costs['smallest']:.2f} to {costs['largest']:.2f})"
         )
     screen.print(text, highlight=False)
-    table = Table(title="What the runs should show")
-    for heading in ("", "", "measured", "promised"):
-        table.add_column(heading, overflow="fold")
-    for check in checks:
-        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
-        table.add_row(mark, check.name, check.measured, check.promised)
-    screen.print(table)
+    show_checks("What the runs should show", checks, screen)
 
 
 def _seed(item: PickFigures, alone: PickFigures) -> str:

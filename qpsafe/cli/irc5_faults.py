@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import console, print_json, progress_bar
+from qpsafe.cli.common import console, progress_bar, show_matrix
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,13 +38,7 @@ def irc5_faults(
             jobs=jobs,
             progress=lambda done, total: progress.update(task, completed=done, total=total),
         )
-    good = all(result.kept for result in results)
-    if json:
-        print_json({"good": good, "cases": [result._asdict() | {"kept": result.kept} for result in results]})
-    else:
-        show(results, screen)
-    if not good:
-        raise typer.Exit(1)
+    show_matrix(results, show, screen, json)
 
 
 def show(results: list[Result], screen: Console) -> None:
