@@ -30,6 +30,7 @@ links: ## git-ignored: static checkers do not follow setuptools' package-dir
 
 bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --json bench.json
+	$(BIN)/qpsafe bench --compile --json bench-compile.json
 	$(BIN)/python benchmarks/bench_hqp.py --json bench-hqp.json
 
 $(VENV)/bin/python:
@@ -49,4 +50,4 @@ $(VENV)/.bench: $(VENV)/bin/python pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build *.egg-info bench.json bench-hqp.json
+	rm -rf $(VENV) out build *.egg-info bench.json bench-compile.json bench-hqp.json

@@ -8,8 +8,8 @@ from numba import types
 
 from qpsafe import limits as limits_module
 from qpsafe.checks import ABSURD_STEP
-from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, entry, inline, readable
+from qpsafe.danger.memory import view
 from qpsafe.hqp import own_regimes
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import solve_regimes
@@ -51,14 +51,14 @@ def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tupl
     b = a + 2 * rows
     c = b + kinds * n
     return (
-        floats[:a].reshape(rows, n),
-        floats[a : a + rows],
-        floats[a + rows : b],
-        floats[b:c].reshape(kinds, n),
-        floats[c : c + 2 * n].reshape(2, n),
-        floats[c + 2 * n :],
-        integers[: 3 * n].reshape(3, n),
-        integers[3 * n :].reshape(kinds, HEADER + 2 * n + rows),
+        view(floats, 0, (rows, n)),
+        view(floats, a, (rows,)),
+        view(floats, a + rows, (rows,)),
+        view(floats, b, (kinds, n)),
+        view(floats, c, (2, n)),
+        view(floats, c + 2 * n, (n,)),
+        view(integers, 0, (3, n)),
+        view(integers, 3 * n, (kinds, HEADER + 2 * n + rows)),
     )
 
 
@@ -69,12 +69,12 @@ _any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
 
 @entry(
     types.UniTuple(types.float64, 2)(
-        _one, _any, _one, _two, types.int64, _ints, _three, _ints, _two, types.float64, types.float64,
-        _one, _three, _two, _one, _one, types.float64,
+        _any, _any, _one, _two, types.int64, _ints, _three, _ints, readable(2), types.float64, types.float64,
+        _one, readable(3), readable(2), _one, _one, types.float64,
         types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
         _ints, types.float64[::1], types.int64[::1], types.float64[::1],
     ),
-    compiled, kinematics, clik, limits_module, own_regimes, *MODULES,
+    kinematics, clik, limits_module, own_regimes, *MODULES,
 )  # fmt: skip
 def resolve_quickly(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,

@@ -9,6 +9,7 @@ from numba import types
 from qpsafe.danger import push
 from qpsafe.danger.compiled import Array, entry, linked, readable
 from qpsafe.danger.evasion import filter_by
+from qpsafe.danger.memory import view
 from qpsafe.danger.push import push_by
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, forward, tree_types, wire_of
@@ -63,8 +64,9 @@ def sense_quickly(
         if not sane:  # NaN too
             return -1, 0, 0, nan
     a = size + 12 * m
-    memory, wire = work[:size], work[size:a].reshape(4, m, 3)
-    velocities, values, torque = work[a : a + 3 * s].reshape(s, 3), work[a + 3 * s : a + 4 * s], work[a + 4 * s :]
+    memory, wire = view(work, 0, (size,)), view(work, size, (4, m, 3))
+    velocities, values = view(work, a, (s, 3)), view(work, a + 3 * s, (s,))
+    torque = view(work, a + 4 * s, (n,))
     # q, q̇ -> kinematics, wire (4)
     for i in range(n):  # contiguous
         torque[i] = q[i]
@@ -78,8 +80,9 @@ def sense_quickly(
     # -> danger (1)-(6) -> virtual torque (8), (14), (15)
     moving = count if ticks[3] else 0  # no velocities: points at rest
     cdf_n = _push_by(
-        points[:count], velocities[:moving], point_links[:count], wire[0], wire[1], wire[2], wire[3],
-        (static, kinetic, gamma), floor, memory, k, starts, stops, values[:count], vectors[:count], torque,
+        view(points, 0, (count, 3)), view(velocities, 0, (moving, 3)), view(point_links, 0, (count,)),
+        wire[0], wire[1], wire[2], wire[3], (static, kinetic, gamma), floor, memory, k, starts, stops,
+        view(values, 0, (count,)), view(vectors, 0, (count, 3)), torque,
     )  # fmt: skip
     # -> evasive velocity (16)
     _filter_by(A, B, before, torque, qd0)

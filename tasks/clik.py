@@ -9,7 +9,6 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, Vector, dot, entry, inline, readable, scale
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, place
@@ -135,7 +134,7 @@ _read, _vector, _matrix = readable(1), types.Array(types.float64, 1, "C", readon
         types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True),
         types.float64, _matrix, _read, types.float64[:, ::1], types.float64[:, ::1],
     ),
-    compiled, kinematics,
+    kinematics,
 )  # fmt: skip
 def _pose_clik(
     memory: Array, supports: Array, k: int, body: int, placement: Array, rows: Index, gain: float,

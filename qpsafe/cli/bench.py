@@ -12,16 +12,24 @@ import typer
 from qpsafe.cli.common import console, progress_bar, write_text
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from qpsafe.laws.problem import Law
 
 
 def bench(
     ticks: Annotated[int, typer.Option(min=100, help="Number of controller ticks to time.")] = 20_000,
     json: Annotated[Path | None, typer.Option(help="Also write the results to this JSON file.")] = None,
+    compile: Annotated[
+        bool, typer.Option("--compile", help="Time the compilation instead, from an empty cache.")
+    ] = False,
 ) -> None:
     """Time the danger field and the whole controller tick; compilation excluded, machine named."""
     screen = console(False)
-    screen.print("Warming up (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    if compile:
+        _compilation(screen, json)
+        return
+    screen.print("Warming up (the first time, compiling the kernels takes about 15 s) ...", style="dim")
     from rich.table import Table
 
     from qpsafe.timing import machine, time_danger_field, time_sensing, time_ticks
@@ -51,10 +59,37 @@ def bench(
     screen.print(table)
     ratio = rows[MAIN].median / rows[MINK].median
     screen.print(f"The whole tick takes {ratio:.2f} of mink.solve_ik with daqp (medians of this run).")
-    if json is not None:
-        content = {"machine": machine(), "unit": "s", "results": {name: t._asdict() for name, t in rows.items()}}
-        write_text(json, json_module.dumps(content, indent=2) + "\n")
-        screen.print(f"written to {json}")
+    _write(screen, json, {name: t._asdict() for name, t in rows.items()})
+
+
+def _compilation(screen: Console, json: Path | None) -> None:
+    """Table of what each kernel takes to compile, and to load."""
+    from rich.table import Table
+
+    from qpsafe.timing_compile import time_compilation
+
+    with screen.status("compiling all kernels from an empty cache, in a process of its own ..."):
+        first, later = time_compilation()
+    table = Table(title="Processor time of each kernel")
+    table.add_column("kernel")
+    table.add_column("compiled [s]", justify="right")
+    table.add_column("from the cache [ms]", justify="right")
+    for name, taken in sorted(first.kernels.items(), key=lambda item: -item[1]):
+        table.add_row(name, f"{taken:.2f}", f"{1e3 * later.kernels[name]:.0f}")
+    table.add_section()
+    table.add_row("the whole process, imports included", f"{first.processor:.1f}", f"{1e3 * later.processor:.0f}")
+    table.add_row("the same on the clock", f"{first.wall:.1f}", f"{1e3 * later.wall:.0f}")
+    screen.print(table)
+    _write(screen, json, {"empty cache": first._asdict(), "from the cache": later._asdict()})
+
+
+def _write(screen: Console, path: Path | None, results: dict[str, Any]) -> None:
+    """The results in a file, with the machine."""
+    if path is not None:
+        from qpsafe.timing import machine
+
+        write_text(path, json_module.dumps({"machine": machine(), "unit": "s", "results": results}, indent=2) + "\n")
+        screen.print(f"written to {path}")
 
 
 #: What a robot with its own sensors runs; everything else is beside it.

@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from threading import Timer
-from time import perf_counter
+from time import perf_counter, process_time
 from types import ModuleType
 from typing import Any
 from zlib import crc32
@@ -21,6 +22,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger import memory
 from qpsafe.errors import ConfigurationError
 
 Vector = tuple[float, float, float]
@@ -43,29 +45,35 @@ PATIENCE = 1.5  # seconds; loading everything from the cache takes less
 NOTICE = "qpsafe: compiling for this machine, once, takes about 15 s ..."
 
 
-class _Notice:
-    """Says, once, that this is compiling, when it has taken longer than loading does."""
+class _Watch:
+    """How long compiling takes, and who is told."""
 
-    spent, said = 0.0, False
+    def __init__(self) -> None:
+        self.total, self.told = 0.0, False
 
-    def say(self) -> None:
-        self.said = True
+    def tell(self) -> None:
+        """Say, once, what is happening."""
+        self.told = True
         print(NOTICE, file=sys.stderr, flush=True)
 
     @contextmanager
-    def expected(self) -> Iterator[None]:
-        begin, timer = perf_counter(), Timer(max(PATIENCE - self.spent, 0.0), self.say)
+    def over(self, kernel: str) -> Iterator[None]:
+        """Compile a kernel under watch; tell when loading all of them would have been over."""
+        begin, used, timer = perf_counter(), process_time(), Timer(max(PATIENCE - self.total, 0.0), self.tell)
         timer.daemon = True
-        if not self.said:
+        if not self.told:
             timer.start()
         try:
             yield
         finally:
             timer.cancel()
-            self.spent += perf_counter() - begin
+            self.total += perf_counter() - begin
+            seconds[kernel] = process_time() - used
 
 
-_notice = _Notice()
+_watch = _Watch()
+seconds: dict[str, float] = {}
+"""Processor time [s] that compiling each kernel, or loading it from the cache, took in this process."""
 
 
 def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -73,15 +81,15 @@ def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Call
 
     Args:
         types_: Types of arguments and result.
-        uses: Other modules whose compiled code goes into this one. numba's cache notices changes of the entry's own
-            file only; so the name it is kept under tells the state of these.
+        uses: Other modules whose compiled code goes into this one, beside this and `memory`. numba's cache notices
+            changes of the entry's own file only; so the name it is kept under tells the state of these.
     """
 
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-        if uses:
-            function.__qualname__ += f"_{checksum(*uses):08x}"
+        kernel = f"{function.__module__}.{function.__name__}"
+        function.__qualname__ += f"_{checksum(sys.modules[__name__], memory, *uses):08x}"
         options = {**_entry, **OPTIONS}
-        with _notice.expected():
+        with _watch.over(kernel):
             try:
                 return numba.njit(types_, cache=True, **options)(function)
             except RuntimeError:  # no directory that numba may write to
@@ -124,10 +132,15 @@ def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
 
 def checksum(*modules: ModuleType) -> int:
     """Of the sources of modules."""
+    return crc32(b"".join(_source(str(module.__file__)) for module in modules))
+
+
+@cache
+def _source(path: str) -> bytes:
     try:
-        return crc32(b"".join(Path(str(module.__file__)).read_bytes() for module in modules))
+        return Path(path).read_bytes()
     except OSError:  # installed without sources
-        return 0
+        return b""
 
 
 def readable(ndim: int) -> Any:

@@ -70,7 +70,7 @@ def act(force: Vector, J0: Array, J1: Array, torque: Array) -> None:
                 torque[j] += (J0[c, j] + J1[c, j]) * force[c]
 
 
-@entry(types.void(readable(3), _links, _links, readable(2), types.float64[::1]))
+@entry(types.void(types.Array(types.float64, 3, "C", readonly=True), _links, _links, readable(2), types.float64[::1]))
 def _torque(J, starts, stops, forces, torque):  # type: ignore[no-untyped-def]
     for i in range(len(starts)):
         act(row(forces, i), J[starts[i]], J[stops[i]], torque)

@@ -79,10 +79,11 @@ def _speed_potential(lam: float, lam1: float, mu: float, Q: Vector, V0: float, V
     size = log(2.0 * Dv * sqrt(zz * zz1) / YY)
     # I = ∫ dl/((l-z) |v_l|) = Ψ/ζ = -2 artanh(ζ/X)/ζ
     if modulus < 1e-6 * XX:
-        r = complex(Xr, -Xi) * (1.0 / XX)  # 1/X
-        zeta = complex(zr, zi)
-        I = -2.0 * r * (1.0 + (zeta * r) * (zeta * r) * (1.0 / 3.0))
-        Ir, Ii = I.real, I.imag
+        # by its series, I = -2/X (1 + (ζ/X)²/3)
+        xr, xi = Xr * (1.0 / XX), -Xi * (1.0 / XX)  # 1/X
+        qr, qi = zr * xr - zi * xi, zr * xi + zi * xr  # ζ/X
+        cr, ci = 1.0 + (qr * qr - qi * qi) * (1.0 / 3.0), 2.0 * qr * qi * (1.0 / 3.0)
+        Ir, Ii = -2.0 * (xr * cr - xi * ci), -2.0 * (xr * ci + xi * cr)
     else:
         r0 = 1.0 / modulus
         Ir, Ii = (size * zr + angle * zi) * r0, (angle * zr - size * zi) * r0

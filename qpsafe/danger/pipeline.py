@@ -5,7 +5,8 @@
    nothing: it is typed and translated to LLVM's language, and goes into its caller like that.
 2. For every single `a[i]` numba goes through all types that have such an operator, twice, which takes a third of the
    time. The answer depends on the types only, so it is kept.
-3. Passes for what this code has none of, closures and array expressions, are left out.
+3. To numba `f(a, 0)` and `f(a, 1)` are two functions to compile; here they are one.
+4. Passes for what this code has none of, closures and array expressions, are left out.
 """
 
 from __future__ import annotations
@@ -53,6 +54,8 @@ class _Remembering(Context):
         return _operators[found]
 
     def resolve_function_type(self, function: Any, args: Any, kws: Any) -> Any:
+        if isinstance(function, types.Dispatcher):  # f(a, 0) and f(a, 1) are the same function
+            args = tuple(types.unliteral(kind) for kind in args)
         if getattr(function, "__module__", "") in ("_operator", "builtins"):
             function = self.resolve_value_type(function)
         return super().resolve_function_type(function, args, kws)
@@ -90,7 +93,7 @@ class _InnerLowering(typed_passes.NativeLowering):
 
 
 class EntryCompiler(Compiler):
-    """numba's compiler, with 2. and 3."""
+    """numba's compiler, with 2. to 4."""
 
     def __init__(self, typing_context: Any, target_context: Any, *others: Any) -> None:
         super().__init__(typing_context, target_context, *others)
@@ -112,7 +115,7 @@ class EntryCompiler(Compiler):
 
 
 class InnerCompiler(EntryCompiler):
-    """numba's compiler, with 1., 2. and 3."""
+    """numba's compiler, with all of that"""
 
     @staticmethod
     def step(step: Any) -> Any:

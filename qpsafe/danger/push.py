@@ -9,8 +9,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger import compiled, evasion, field, kernel, vector
-from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.danger import evasion, field, kernel, vector
+from qpsafe.danger.compiled import Array, entry, linked, readable
 from qpsafe.danger.evasion import act, link_vectors, virtual_torque
 from qpsafe.danger.field import AT_REST, DangerField, danger_vectors
 from qpsafe.danger.kernel import danger_field
@@ -63,11 +63,12 @@ def _by_parts(
     return values, vectors, torque, float(values.max(initial=0.0)) if good else np.nan
 
 
+_danger_field = linked(danger_field)
 _rows, _ints = readable(2), types.Array(types.int64, 1, "A", readonly=True)
 _weights, _out, _outs = types.UniTuple(types.float64, 3), types.float64[::1], types.float64[:, ::1]
 
 
-USES = (compiled, evasion, field, kernel, vector, kinematics)
+USES = (evasion, field, kernel, vector, kinematics)
 
 
 @entry(
@@ -96,7 +97,7 @@ def push_by(
     torque: Array,
 ) -> float:
     """Fill values, vectors, torque; returns CDF_n."""  # fmt: skip
-    danger_field(points, velocities, r0, r1, v0, v1, weights, floor, values, vectors)  # (1)-(5), gradients
+    _danger_field(points, velocities, r0, r1, v0, v1, weights, floor, values, vectors)  # (1)-(5), gradients
     jacobians = cut(memory, torque.shape[0], k)[3]
     torque[:] = 0.0
     cdf_n, good = 0.0, True

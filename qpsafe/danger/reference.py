@@ -10,12 +10,11 @@ from __future__ import annotations
 from typing import Any, TypeVar
 from zlib import crc32
 
-import numba
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
+from numba.extending import infer_getattr, lower_builtin, lower_getattr_generic, models, register_model, type_callable
 
 T = TypeVar("T")
 
@@ -51,18 +50,16 @@ def _load(context: Any, builder: Any, reference: Reference, pointer: Any, name: 
     return impl_ret_borrowed(context, builder, target.types[index], value)
 
 
-@intrinsic
-def _by_reference(_: Any, target: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.bitcast(cgutils.alloca_once_value(builder, values[0]), cgutils.voidptr_t)
-
-    return Reference(target)(target), generate
-
-
 def by_reference(target: T) -> T:
     """The named tuple, for functions that the caller calls; it must not be returned."""
     return target
 
 
-if not numba.config.DISABLE_JIT:
-    by_reference = _by_reference
+@type_callable(by_reference)
+def _type_of(_: Any) -> Any:
+    return lambda target: Reference(target) if isinstance(target, types.NamedTuple) else None
+
+
+@lower_builtin(by_reference, types.NamedTuple)
+def _lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    return builder.bitcast(cgutils.alloca_once_value(builder, values[0]), cgutils.voidptr_t)

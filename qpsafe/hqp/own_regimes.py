@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.compiled import inline
+from qpsafe.danger.memory import view
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_solver import solve_compiled as solve
 from qpsafe.hqp.own_state import floats_of, workspace
@@ -58,10 +59,11 @@ def solve_regimes(
         for level in range(kept):
             last[level] = ends[level]
         last[kept] = rows
-        known = target[:rows]
+        known = view(target, 0, (rows,))
         solve(
-            floats[: _count_floats(n, rows, m)], integers, m, x[kept], info[kept, : HEADER + n + rows],
-            matrix[:rows], known, known, target[:0], last[: kept + 1], lower, upper, False, damping,
+            view(floats, 0, (_count_floats(n, rows, m),)), integers, m, x[kept],
+            view(info, kept * info.shape[1], (HEADER + n + rows,)), view(matrix, 0, (rows, n)), known, known,
+            view(target, 0, (0,)), view(last, 0, (kept + 1,)), lower, upper, False, damping,
         )  # fmt: skip
         for j in range(n):
             qd[j] += weights[kept] * x[kept, j]

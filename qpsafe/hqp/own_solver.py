@@ -9,6 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from qpsafe.danger import reference
 from qpsafe.danger.compiled import entry, linked
 from qpsafe.hqp import own_damping, own_hierarchy, own_level, own_linear, own_rules, own_state
 from qpsafe.hqp.own_hierarchy import HEADER, run
@@ -31,7 +32,7 @@ _SIGNATURE = types.void(
 
 
 #: All the code that goes into the kernel.
-MODULES = (own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
+MODULES = (reference, own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
 solve = entry(_SIGNATURE, *MODULES)(run)
 solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""

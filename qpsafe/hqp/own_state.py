@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qpsafe.danger.compiled import inline
+from qpsafe.danger.memory import view
 from qpsafe.hqp.own_linear import Array, Index, householder, image, reflect, remove_column
 
 HUGE = 1e60  # numbers beyond cannot be squared safely: unusable in A, no bound as bounds
@@ -77,15 +78,16 @@ def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
     """The arrays of one solve, cut from two blocks: each allocation would cost as much as a factorisation."""
     n = x.shape[0]
     c, width = n + rows, n + m
-    A, f = f[: rows * n].reshape(rows, n), f[rows * n :]
-    G, f = f[: n * width].reshape(n, width), f[n * width :]
-    R, f = f[: n * n].reshape(n, n), f[n * n :]
-    F, f = f[: 2 * m * m].reshape(2 * m, m), f[2 * m * m :]
-    low, high, kept, f = f[:c], f[c : 2 * c], f[2 * c : 3 * c], f[3 * c :]
-    d, u, scratch, f = f[:width], f[width : 2 * width], f[2 * width : 3 * width], f[3 * width :]
-    r, tau, diagonal, reference = f[:m], f[m : m + n], f[m + n : m + 2 * n], f[m + 2 * n :]  # the last n
-    kind, side, working, i = i[:c], i[c : 2 * c], i[2 * c : 2 * c + n], i[2 * c + n :]
-    chosen, flags = i[:m], i[m:]
+    A, at = view(f, 0, (rows, n)), rows * n
+    G, at = view(f, at, (n, width)), at + n * width
+    R, at = view(f, at, (n, n)), at + n * n
+    F, at = view(f, at, (2 * m, m)), at + 2 * m * m
+    low, high, kept, at = view(f, at, (c,)), view(f, at + c, (c,)), view(f, at + 2 * c, (c,)), at + 3 * c
+    d, u, at = view(f, at, (width,)), view(f, at + width, (width,)), at + 2 * width
+    scratch, r, at = view(f, at, (width,)), view(f, at + width, (m,)), at + width + m
+    tau, diagonal, reference = view(f, at, (n,)), view(f, at + n, (n,)), view(f, at + 2 * n, (n,))
+    kind, side, at = view(i, 0, (c,)), view(i, c, (c,)), 2 * c
+    working, chosen, flags = view(i, at, (n,)), view(i, at + n, (m,)), view(i, at + n + m, (1,))
     return State(
         A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch, reference, flags
     )  # fmt: skip

@@ -15,6 +15,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.danger.compiled import Array, entry, inline
+from qpsafe.danger.memory import view
 
 Index = NDArray[np.int64]
 
@@ -73,10 +74,10 @@ def cut(memory: Array, n: int, k: int) -> tuple[Array, Array, Array, Array]:
     the wire (k, 3) and their linear Jacobians (k, 3, n)."""
     a, b, c = 16 * (n + 1), 16 * (n + 1) + 6 * n, 16 * (n + 1) + 6 * n + 3 * k
     return (
-        memory[:a].reshape(n + 1, 4, 4),
-        memory[a:b].reshape(6, n),
-        memory[b:c].reshape(k, 3),
-        memory[c : c + 3 * k * n].reshape(k, 3, n),
+        view(memory, 0, (n + 1, 4, 4)),
+        view(memory, a, (6, n)),
+        view(memory, b, (k, 3)),
+        view(memory, c, (k, 3, n)),
     )
 
 

@@ -169,7 +169,7 @@ class HullSet:
             poses: Of the bodies in the world, (b, 4, 4).
         """
         found = np.empty(len(points), dtype=np.int64)
-        _find(points, tolerance, poses, *self.tables, found)
+        _find(points, tolerance, np.ascontiguousarray(poses), *self.tables, found)
         return found
 
 
@@ -199,10 +199,11 @@ def within(p: Vector, t: float, poses: Array, bodies: Array, first: Array, plane
     return -1
 
 
-_INTS = types.Array(types.int64, 1, "A", readonly=True)
+_ints = types.Array(types.int64, 1, "C", readonly=True)
+_two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (2, 3))
 
 
-@entry(types.void(readable(2), readable(1), readable(3), _INTS, _INTS, readable(2), readable(2), types.int64[::1]))
+@entry(types.void(readable(2), readable(1), _three, _ints, _ints, _two, _two, types.int64[::1]))
 def _find(
     points: Array,
     tolerance: Array,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, add, entry, readable
+from qpsafe.danger.memory import view
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
 from qpsafe.sensing import health, hold, hulls, spots, velocity
@@ -19,7 +19,7 @@ from qpsafe.sensing.velocity import approach
 _floats, _rows = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 2, "C", readonly=True)
 _ints, _out, _outs = types.Array(types.int64, 1, "C", readonly=True), types.float64[::1], types.float64[:, ::1]
 
-USES = (compiled, kinematics, health, hold, hulls, spots, velocity)
+USES = (kinematics, health, hold, hulls, spots, velocity)
 
 
 @entry(
@@ -80,7 +80,7 @@ def take_readings(
     step, jump, alpha, beta, fastest = numbers[5], numbers[6], numbers[7], numbers[8], numbers[9]
     stuck_ticks, dead_ticks, hold_ticks, moving = ticks[0], ticks[1], ticks[2], ticks[3]
     n = (memory.shape[0] - 16) // 16  # enough for the poses of the bodies, which come first
-    poses = memory[: 16 * n + 16].reshape(n + 1, 4, 4)
+    poses = view(memory, 0, (n + 1, 4, 4))
     count, dying, out = 0, 0, 0
     for i in range(distances.shape[0]):
         d = distances[i]

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Vector, entry, inline, readable
+from qpsafe.danger.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ class SpotArray:
 def rays_in_world(poses: Array, bodies: NDArray[np.int64], rays: Array) -> tuple[Array, Array]:
     """Origins and directions (k, 3) of rays that are fixed in bodies with the given poses (b, 4, 4)."""
     origins, directions = np.empty((len(bodies), 3)), np.empty((len(bodies), 3))
-    _rays(poses, bodies, rays, origins, directions)
+    _rays(np.ascontiguousarray(poses), bodies, np.ascontiguousarray(rays), origins, directions)
     return origins, directions
 
 
@@ -211,9 +211,9 @@ def ray_of(T: Array, ray: Array) -> tuple[Vector, Vector]:
 
 @entry(
     types.void(
-        readable(3),
+        types.Array(types.float64, 3, "C", readonly=True),
         types.Array(types.int64, 1, "A", readonly=True),
-        readable(3),
+        types.Array(types.float64, 3, "C", readonly=True),
         types.float64[:, ::1],
         types.float64[:, ::1],
     )

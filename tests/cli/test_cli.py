@@ -125,6 +125,15 @@ def test_unknown_robot_is_one_line_and_exit_code_1() -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
+def test_bench_compiles_every_kernel_and_finds_it_in_the_cache(tmp_path: Path) -> None:
+    result = run(app, ["bench", "--compile", "--json", str(tmp_path / "bench.json")])
+    assert result.exit_code == 0
+    first, later = json.loads((tmp_path / "bench.json").read_text())["results"].values()
+    assert first["kernels"].keys() == later["kernels"].keys() >= {"qpsafe.hqp.own_hierarchy.run"}
+    assert later["processor"] < 0.5 * first["processor"]
+
+
 def test_bench_writes_its_figures(tmp_path: Path) -> None:
     result = run(app, ["bench", "--ticks", "100", "--json", str(tmp_path / "bench.json")])
     assert result.exit_code == 0, result.output

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import NamedTuple
 
 import numba
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 from numba import types
 
-from qpsafe.danger.compiled import OPTIONS, entry, inline
+from qpsafe.danger.compiled import OPTIONS, entry, inline, seconds
+from qpsafe.danger.memory import view
 from qpsafe.danger.reference import by_reference
+from qpsafe.timing_compile import modules
 
 
 def mixed(a: np.ndarray, b: np.ndarray, k: int) -> float:
@@ -46,6 +49,23 @@ def test_the_bits_are_those_of_numba() -> None:
         assert np.array(by_own(a, b, 1)).tobytes() == np.array(by_numba(a, b, 1)).tobytes()
 
 
+def cut(block: np.ndarray, rows: int) -> float:
+    matrix, rest = view(block, 2, (rows, 3)), view(block, 2 + 3 * rows, (2,))
+    rest[1] += matrix[rows - 1, 2]
+    return matrix[1, 0] - view(matrix, 2, (2, 2))[1, 1] + rest[0]
+
+
+cut_compiled = entry(types.float64(types.float64[::1], types.int64))(cut)
+
+
+def test_a_view_is_the_same_array_in_python_and_compiled() -> None:
+    for rows in (2, 3, 5):
+        ours, theirs = np.random.default_rng(rows).normal(size=(2, 4 + 3 * rows))
+        theirs[:] = ours
+        assert cut_compiled(ours, rows) == cut(theirs, rows)
+        assert ours.tobytes() == theirs.tobytes()
+
+
 class Parts(NamedTuple):
     whole: np.ndarray
     numbers: np.ndarray
@@ -71,6 +91,14 @@ def test_a_reference_stands_for_the_tuple() -> None:
     assert through_a_reference(a, numbers, 10.0) == 12
     assert a.tolist() == [0.0, 1.0, 2.0, 33.0, 34.0, 35.0]
     assert numbers.tolist() == [0, 1, 2]
+
+
+def test_every_kernel_is_timed() -> None:
+    found = modules()
+    for name in found:
+        importlib.import_module(name)
+    own = {kernel.rsplit(".", 1)[0] for kernel in seconds if kernel.startswith("qpsafe.")}
+    assert own - {"qpsafe.hqp.own_hierarchy"} == set(found) - {"qpsafe.hqp.own_solver"}
 
 
 def test_operators_of_other_types_are_found_afterwards() -> None:
