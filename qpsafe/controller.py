@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -239,7 +240,8 @@ class SafetyController:
             command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
-        off_path = None if self.recovery.on_path else self._errors(commanded)
+        path_time = self.recovery.path_time
+        off_path = None if self.recovery.on_path else partial(_errors, self.tasks, commanded, path_time)
         messages = (*messages, *seen.notes)
         return Tick(
             reference=self._advance(command),
@@ -255,7 +257,7 @@ class SafetyController:
             points=seen.points,
             links=seen.links,
             vectors=seen.vectors,
-            path_time=self.recovery.path_time,
+            path_time=path_time,
             events=self.recovery.take_events(),
             waits_for=self.recovery.waits_for,
             joint_names=self.robot.joint_names,
@@ -293,7 +295,7 @@ class SafetyController:
         self._q.flags.writeable = False  # tasks of any kind will see it
         return JointReference(self._seq, self._seq * self.dt, self._q.copy(), command, self._active)
 
-    def _errors(self, state: RobotState) -> tuple[NDArray[np.float64], ...]:
-        """Errors against the tasks' own trajectories, not against the way back to them."""
-        t = self.recovery.path_time
-        return tuple(task.error(task.value(state), task.trajectory.sample(t)) for task in self.tasks)
+
+def _errors(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
+    """Errors against the tasks' own trajectories, not against the way back to them."""
+    return tuple(task.error(task.value(state), task.trajectory.sample(time)) for task in tasks)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -179,7 +178,7 @@ class Recovery:
         offset, before, joints = sample.offset(value), self._offset_before(k), value.ndim == 1
         back, self._offsets[k] = self._returns[k], offset
         if back is not None and active >= 1.0:
-            back = replace(back, time=back.time + self.dt)
+            back = back.later(self.dt)
         else:
             rate = np.zeros_like(offset) if before is None else (offset - before) / self.dt
             if not active >= 1.0 or self.rules.too_fast(rate, joints, getattr(task, "rows", range(6))):

@@ -91,12 +91,17 @@ class Return:
     duration: float
     time: float = 0.0
 
+    def later(self, dt: float) -> Return:
+        """The same return after a tick [s]."""
+        return Return(self.offset, self.speed, self.duration, self.time + dt)
+
     def displace(self, sample: Any) -> Any:
         """The reference with what is left of the offset."""
         T = self.duration
         s, ds = minimum_jerk(self.time / T)
         r, dr = run_out(self.time / T)
-        return sample.displaced((1.0 - s) * self.offset + r * T * self.speed, -ds / T * self.offset + dr * self.speed)
+        offset, speed = self.offset, self.speed
+        return sample.displaced((1.0 - s) * offset + (r * T) * speed, (-ds / T) * offset + dr * speed)
 
 
 class GentleLimits:
@@ -124,7 +129,7 @@ class GentleLimits:
         if self._made is None or self._made[0] is not limits:
             self._made = limits, limits.gentler(self._share)
         gentle = self._made[1]
-        return limits if gentle.box(q, qd, qdd).sacrificed.any() else gentle
+        return limits if any(gentle.box(q, qd, qdd).sacrificed.tolist()) else gentle
 
 
 def minimum_jerk(tau: float) -> tuple[float, float]:

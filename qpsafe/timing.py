@@ -107,10 +107,10 @@ def time_ticks(
     points: bool = False,
     collector: str = "off",
 ) -> Times:
-    """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through all regimes.
+    """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through medium and high danger and back.
 
-    The distances sweep slowly from 0.76 m to 0.32 m and back, so that every regime and transition occurs; the robot
-    follows its references exactly.
+    The distances sweep slowly from 0.76 m to 0.32 m and back; the path is suspended and the robot recovers. It follows
+    its references exactly.
 
     Args:
         law: The law.

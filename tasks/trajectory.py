@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -24,8 +25,8 @@ class Sample(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """Whether the reference can be followed at all."""
-        return bool(np.isfinite(self.pose).all() and np.isfinite(self.twist).all())
+        """Whether the reference can be followed at all: its squares sum up to a finite number."""
+        return isfinite(np.vdot(self.pose, self.pose) + np.vdot(self.twist, self.twist))
 
     def slowed(self, rate: float) -> Sample:
         """The same reference on a clock that runs `rate` times as fast."""
@@ -33,16 +34,19 @@ class Sample(NamedTuple):
 
     def offset(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far a pose is from the reference: shift, then rotation vector, world axes (6,) [m, rad]."""
-        return np.concatenate((value[:3, 3] - self.pose[:3, 3], log3(value[:3, :3] @ self.pose[:3, :3].T)))
+        offset, pose = np.empty(6), self.pose
+        offset[:3] = value[:3, 3] - pose[:3, 3]
+        offset[3:] = log3(value[:3, :3] @ pose[:3, :3].T)
+        return offset
 
     def displaced(self, offset: NDArray[np.float64], rate: NDArray[np.float64]) -> Sample:
         """The reference moved by an offset (6,) that changes by `rate` (6,) [m/s, rad/s]."""
-        turn = exp3(offset[3:])
-        pose = np.eye(4)
-        pose[:3, 3] = self.pose[:3, 3] + offset[:3]
+        vector = offset[3:]
+        turn, pose, twist = exp3(vector), self.pose.copy(), self.twist + rate
+        pose[:3, 3] += offset[:3]
         pose[:3, :3] = turn @ self.pose[:3, :3]
-        angular = turn @ self.twist[3:] + exp3_jacobian(offset[3:]) @ rate[3:]
-        return Sample(pose, np.concatenate((self.twist[:3] + rate[:3], angular)))
+        twist[3:] = turn @ self.twist[3:] + exp3_jacobian(vector) @ rate[3:]
+        return Sample(pose, twist)
 
 
 class JointSample(NamedTuple):
@@ -59,7 +63,7 @@ class JointSample(NamedTuple):
     @property
     def finite(self) -> bool:
         """Whether the reference can be followed at all."""
-        return bool(np.isfinite(self.position).all() and np.isfinite(self.velocity).all())
+        return isfinite(np.vdot(self.position, self.position) + np.vdot(self.velocity, self.velocity))
 
     def slowed(self, rate: float) -> JointSample:
         """The same reference on a clock that runs `rate` times as fast."""
