@@ -6,18 +6,19 @@ Let w = p - r_l, R = |w|. With weights k1, k2, gamma, all 1 in the source,
     CDF = sum over links of  k1 S + k2 (gamma K2 + K1),   S = ∫ 1/R dl,   K1 = ∫ v·w/R³ dl,   K2 = ∫ |v|/R² dl.
 
 `_near` integrates in closed form. That loses digits of K2 far from the link, and fails for a link of length zero: there
-`_far` takes a quadrature, exact to rounding. All formulas are in one file because numba's cache sees changes of the
-entry's own file only.
+`_far` takes a quadrature, exact to rounding. What depends on the speed |v_l| is in `speed`.
 """
 
 from __future__ import annotations
 
-from math import atan2, copysign, inf, isfinite, log, log1p, nan, pi, sqrt
+from math import inf, isfinite, log1p, nan, sqrt
 
 import numpy as np
 from numba import types
 
+from qpsafe.danger import speed as speed_module
 from qpsafe.danger.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
+from qpsafe.danger.speed import Motion, motion_of, speed_potential
 
 # `_far` is for L/(R0+R1) below this, where its error is < 1e-11; that of the closed form grows as (R/L)², 2e-11 here.
 FAR = 0.05
@@ -25,74 +26,6 @@ FAR = 0.05
 # Gauss-Legendre rule on s in [-1/2, 1/2]; row j: coefficients 0 to 7 of Lagrange's polynomial of node j / weight j.
 NODES, WEIGHTS = (0.5 * x for x in np.polynomial.legendre.leggauss(8))
 LAGRANGE = np.linalg.inv(np.vander(NODES, increasing=True)).T / WEIGHTS[:, None]
-
-
-# speed V0 + V1; by which these are divided: v0, v1, δ = v1 - v0, V0 = |v0|, V1 = |v1|; α = |δ|²; Dv; A
-Motion = tuple[float, Vector, Vector, Vector, float, float, float, float, float]
-
-
-@inline
-def _motion(v0: Vector, v1: Vector) -> Motion:
-    """Return what depends on the velocities alone; K1 and K2 are homogeneous in them."""
-    speed = sqrt(dot(v0, v0)) + sqrt(dot(v1, v1))
-    if speed > 0.0:
-        v0, v1 = scale(1.0 / speed, v0), scale(1.0 / speed, v1)
-    V0, V1, delta, vv = sqrt(dot(v0, v0)), sqrt(dot(v1, v1)), add(v1, -1.0, v0), dot(v0, v1)
-    # Dv = V0 V1 + v0·v1 without cancellation
-    Dv, x, alpha = V0 * V1 + vv, cross(v0, v1), dot(delta, delta)
-    if vv < 0.0:
-        Dv = dot(x, x) / (V0 * V1 - vv)
-    # A = α ∫ dl/|v_l| = sqrt(α) log1p(sqrt(α) (V0 + V1 + sqrt(α))/Dv)
-    A = sqrt(alpha) * log1p(sqrt(alpha) * (1.0 + sqrt(alpha)) / Dv)
-    if Dv < 1e-30:  # the velocity passes through 0: log Dv, unbounded, drops out of A + F below; leave it out of both
-        Dv, A = 1.0, sqrt(alpha) * log(sqrt(alpha) * (1.0 + sqrt(alpha)))
-    return speed, v0, v1, delta, V0, V1, alpha, Dv, A
-
-
-@inline
-def _speed_potential(lam: float, lam1: float, mu: float, Q: Vector, V0: float, V1: float, Dv: float) -> Vector:
-    """Return F = Im Φ/μ - A = Im(ζΨ)/μ with its derivatives ∂F/∂λ and (∂F/∂μ)/μ, where Φ(z) = ∫ |v_l|/(l - z) dl.
-
-    z = λ + iμ, lam1 = λ - 1, Q = (|vλ|², vλ·δ, α) with vλ = v0 + λδ, α = |δ|². L² K2 = Im Φ/μ = F + A.
-    """
-    c, b, alpha = Q
-    zz, zz1 = lam * lam + mu * mu, lam1 * lam1 + mu * mu
-    # ζ² = |vλ|² - μ²α + 2iμ vλ·δ = |v_l|² continued to l = z; ζ is the root on the side of X = V1 z + V0 (z-1)
-    re, im = c - mu * mu * alpha, 2.0 * mu * b
-    modulus = sqrt(re * re + im * im)
-    major = sqrt(0.5 * (modulus + abs(re)))
-    minor = 0.5 * im / major if major > 0.0 else 0.0
-    zr, zi = (major, minor) if re >= 0.0 else (abs(minor), copysign(major, im))
-    Xr, Xi = V1 * lam + V0 * lam1, (V0 + V1) * mu
-    if Xr * zr + Xi * zi < 0.0:
-        zr, zi = -zr, -zi
-    Yr, Yi = Xr + zr, Xi + zi
-    XX, YY = Xr * Xr + Xi * Xi, Yr * Yr + Yi * Yi
-    # Ψ = Log f - Log g with f = 2 Dv (z-1)/Y, g = Y/z: one logarithm and one angle, on the sheet of the two logs
-    fr, fi = lam1 * Yr + mu * Yi, mu * Yr - lam1 * Yi  # (z-1) Ȳ
-    gr, gi = lam * Yr + mu * Yi, lam * Yi - mu * Yr  # Y z̄
-    angle = atan2(fi * gr - fr * gi, fr * gr + fi * gi)
-    if fi > 0.0 and gi < 0.0 and angle < 0.0:
-        angle += 2.0 * pi
-    elif fi < 0.0 and gi > 0.0 and angle > 0.0:
-        angle -= 2.0 * pi
-    size = log(2.0 * Dv * sqrt(zz * zz1) / YY)
-    # I = ∫ dl/((l-z) |v_l|) = Ψ/ζ = -2 artanh(ζ/X)/ζ
-    if modulus < 1e-6 * XX:
-        # by its series, I = -2/X (1 + (ζ/X)²/3)
-        xr, xi = Xr * (1.0 / XX), -Xi * (1.0 / XX)  # 1/X
-        qr, qi = zr * xr - zi * xi, zr * xi + zi * xr  # ζ/X
-        cr, ci = 1.0 + (qr * qr - qi * qi) * (1.0 / 3.0), 2.0 * qr * qi * (1.0 / 3.0)
-        Ir, Ii = -2.0 * (xr * cr - xi * ci), -2.0 * (xr * ci + xi * cr)
-    else:
-        r0 = 1.0 / modulus
-        Ir, Ii = (size * zr + angle * zi) * r0, (angle * zr - size * zi) * r0
-    # ∂F/∂λ = Im Φ'/μ, ∂F/∂μ = (Re Φ' - A - F)/μ with Φ' - A = (vλ·δ + iμα) I + V1/(z-1) - V0/z
-    n0, n1, m = V0 / zz, V1 / zz1, 1.0 / mu
-    F = (re * Ii + im * Ir) * m
-    axial = b * Ii * m + alpha * Ir - n1 + n0
-    radial = (b * Ir - mu * alpha * Ii + n1 * lam1 - n0 * lam - F) * m * m
-    return F, axial, radial
 
 
 @inline
@@ -130,13 +63,13 @@ def _near(w0: Vector, w1: Vector, d: Vector, motion: Motion, k: Vector) -> tuple
     lam, lam1, mu = -t0 * iL, -t1 * iL, max(sqrt(hh) * iL, 1e-12)
     vl = add(v0, lam, delta)
     Q = (dot(vl, vl), dot(vl, delta), alpha)
-    F, axial, radial = _speed_potential(lam, lam1, mu, Q, V0, V1, Dv)
+    F, axial, radial = speed_potential(lam, lam1, mu, Q, V0, V1, Dv)
     K2 = (A + F) * iL * iL
     # by the axis, outside the link, digits of ∂F/∂μ cancel: extrapolate from μ' and 2μ' by its series in μ²
     off = 3e-3 * min(abs(lam), abs(lam1))
     if mu < off and lam * lam1 > 0.0:
-        once = _speed_potential(lam, lam1, off, Q, V0, V1, Dv)[2]
-        twice = _speed_potential(lam, lam1, 2.0 * off, Q, V0, V1, Dv)[2]
+        once = speed_potential(lam, lam1, off, Q, V0, V1, Dv)[2]
+        twice = speed_potential(lam, lam1, 2.0 * off, Q, V0, V1, Dv)[2]
         radial = once + (once - twice) * (1.0 - (mu / off) ** 2) / 3.0
     # ∇K2 = [u ∂F/∂λ + (w⊥/h) ∂F/∂μ]/L³
     iL3 = iL * iL * iL
@@ -209,8 +142,8 @@ def _any_normal(d: Vector, v: Vector) -> Vector:
 
 
 @inline
-def _link(p: Vector, r0: Vector, r1: Vector, motion: Motion, k: Vector, floor: float) -> tuple[float, Vector]:
-    """Value and gradient of one link at p, or at distance `floor` from the link if p is nearer than that."""
+def placed(p: Vector, r0: Vector, r1: Vector, motion: Motion, floor: float) -> tuple[Vector, Vector, Vector]:
+    """The link d, and p as seen from both its ends; p at distance `floor` from the link if it is nearer than that."""
     d, w0, w1 = add(r1, -1.0, r0), add(p, -1.0, r0), add(p, -1.0, r1)
     dd = dot(d, d)
     l = min(max(dot(w0, d) / dd, 0.0), 1.0) if dd > 0.0 else 0.5
@@ -223,6 +156,14 @@ def _link(p: Vector, r0: Vector, r1: Vector, motion: Motion, k: Vector, floor: f
             n = add(n, -dot(n, d) / dd, d)
         n = scale(floor / sqrt(dot(n, n)), n)
         w0, w1 = add(n, l, d), add(n, l - 1.0, d)
+    return d, w0, w1
+
+
+@inline
+def _link(p: Vector, r0: Vector, r1: Vector, motion: Motion, k: Vector, floor: float) -> tuple[float, Vector]:
+    """Value and gradient of one link at p."""
+    d, w0, w1 = placed(p, r0, r1, motion, floor)
+    dd = dot(d, d)
     if dd < 1e-18 * dot(w0, w0) < inf and motion[6] < 1e-18:  # errors below 1e-18
         return _point(add(w0, -0.5, d), motion, k)
     if sqrt(dd) < FAR * (sqrt(dot(w0, w0)) + sqrt(dot(w1, w1))):
@@ -235,7 +176,8 @@ _OUT, _OUTS = types.float64[::1], types.float64[:, ::1]
 
 
 @entry(
-    types.void(_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _ROWS, types.UniTuple(types.float64, 3), types.float64, _OUT, _OUTS)
+    types.void(_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _WEIGHTS, types.float64, _OUT, _OUTS),
+    speed_module,
 )
 def danger_field(
     points: Array,
@@ -254,11 +196,11 @@ def danger_field(
     value[:], gradient[:] = 0.0, 0.0
     for i in range(r0.shape[0]):
         a, b, va, vb = row(r0, i), row(r1, i), row(v0, i), row(v1, i)
-        motion = _motion(va, vb)
+        motion = motion_of(va, vb)
         for j in range(points.shape[0]):
             if moving:
                 vp = row(point_velocities, j)
-                motion = _motion(add(va, -1.0, vp), add(vb, -1.0, vp))
+                motion = motion_of(add(va, -1.0, vp), add(vb, -1.0, vp))
             c, g = _link(row(points, j), a, b, motion, k, floor)
             value[j] += c
             gradient[j, 0], gradient[j, 1], gradient[j, 2] = add(row(gradient, j), 1.0, g)

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger import evasion, field, kernel, vector
+from qpsafe.danger import evasion, field, kernel, speed, vector
 from qpsafe.danger.compiled import Array, entry, linked, readable
 from qpsafe.danger.evasion import act, link_vectors, virtual_torque
 from qpsafe.danger.field import AT_REST, DangerField, danger_vectors
@@ -68,7 +68,7 @@ _rows, _ints = readable(2), types.Array(types.int64, 1, "A", readonly=True)
 _weights, _out, _outs = types.UniTuple(types.float64, 3), types.float64[::1], types.float64[:, ::1]
 
 
-USES = (evasion, field, kernel, vector, kinematics)
+USES = (evasion, field, kernel, speed, vector, kinematics)
 
 
 @entry(

@@ -39,7 +39,7 @@ def test_kinetic_gradient_obeys_eulers_theorem(seed: int) -> None:
     """H is homogeneous of degree 1: ∂H/∂q̇ q̇ = H."""
     state, qd, points = scene(seed)
     H = FIELD.value(points, state.wire(qd)) - FIELD.value(points, state.wire(np.zeros(6)))
-    assert DangerBarrier(10.0).kinetic_gradient(state, qd, points) @ qd == pytest.approx(H, rel=1e-5)
+    assert DangerBarrier(10.0).kinetic_gradient(state, qd, points) @ qd == pytest.approx(H, rel=1e-12)
 
 
 @settings(max_examples=40, deadline=None)
