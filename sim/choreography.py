@@ -63,9 +63,9 @@ class Phase(NamedTuple):
 
 #: The first experiment: front, left, right. The first pause leaves medium danger, the second high danger.
 FIRST_EXPERIMENT: tuple[Approach, ...] = (
-    Approach(math.radians(0.0), start=3.5, medium_distance=1.02, close_distance=0.72, close_pause=2.5),
-    Approach(math.radians(72.0), start=18.5, medium_distance=0.80, close_distance=0.50, close_pause=2.5),
-    Approach(math.radians(-72.0), start=36.0, medium_distance=0.80, close_distance=0.50, close_pause=2.5),
+    Approach(math.radians(0.0), start=3.3, medium_distance=0.90, close_distance=0.72, close_pause=2.5),
+    Approach(math.radians(72.0), start=18.5, medium_distance=0.72, close_distance=0.50, close_pause=2.5),
+    Approach(math.radians(-72.0), start=36.0, medium_distance=0.70, close_distance=0.50, close_pause=2.5),
 )
 
 

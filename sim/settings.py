@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -30,6 +30,9 @@ from qpsafe.sim.settings_pick import KIND, pick_of, pick_settings
 from qpsafe.sim.story import StepProblem, Story
 from qpsafe.sim.story_steps import StoryTable
 
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
 Experiment = FixedExperiment | PickPlaceExperiment
 PLAIN = ("seed", "lag", "limits", "duration", "sensor", "cap")
 
@@ -49,6 +52,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     robot, story = experiment.robot, experiment.story
     found: dict[str, Any] = {
         "robot": robot.name if robot.name in bundled_robots() else str(robot.folder),
+        "spots": _spots(robot),
         "law": law_settings(experiment.law),
         "rules": None if experiment.rules is None else asdict(experiment.rules),
         "recovery": None if experiment.recovery is None else asdict(experiment.recovery),
@@ -73,6 +77,8 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
     """
     try:
         robot = load_robot(settings["robot"])
+        if settings.get("spots") is not None:
+            robot = robot.with_spots(settings["spots"])
         options: dict[str, Any] = {"law": law_of(settings["law"])}
         for name, make in (("rules", SensingRules), ("recovery", RecoveryRules)):
             options[name] = None if settings[name] is None else make(**settings[name])
@@ -90,6 +96,12 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
     except (KeyError, TypeError, AttributeError) as problem:
         raise ConfigurationError("the recorded settings", str(problem), None, "a complete set") from None
     raise ConfigurationError("the recorded settings", "kind", settings["kind"], f"fixed, path or {KIND}")
+
+
+def _spots(robot: Robot) -> str | None:
+    """The file of the robot's sensors: its name in the robot's folder, or its path."""
+    path = robot.spots_path
+    return None if path is None else path.name if path.parent == robot.folder else str(path.resolve())
 
 
 def controller_of(experiment: Experiment) -> SafetyController:

@@ -24,6 +24,7 @@ from qpsafe.cli.common import (
 from qpsafe.cli.demo_fast import fast_person
 from qpsafe.cli.demo_path import path
 from qpsafe.cli.demo_pick import pick_and_place
+from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,6 +61,9 @@ def fixed(
     cap: Annotated[
         float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default it is not.")
     ] = None,
+    spots: Annotated[
+        str | None, typer.Option(help="Other sensors: a file in the robot's folder, as spots-by-hand.toml, or a path.")
+    ] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the source's.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
@@ -70,6 +74,8 @@ def fixed(
     from qpsafe.cli.demo_robots import every_robot
 
     screen = console(json)
+    if spots is not None and robot == "all":
+        raise ConfigurationError("qpsafe demo fixed", "spots", spots, "one robot, not 'all': sensors fit one robot")
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.encounter import encounter
@@ -78,7 +84,7 @@ def fixed(
     from qpsafe.sim.story_file import load_story
 
     def make(name: str) -> FixedExperiment:
-        chosen = load_robot(name)
+        chosen = load_robot(name) if spots is None else load_robot(name).with_spots(spots)
         told = None if story is None else load_story(story, floor=-robot_stage(chosen).pedestal)
         return FixedExperiment(
             chosen,

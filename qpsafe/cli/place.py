@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 def place(
+    context: typer.Context,
     robot: Annotated[str, typer.Argument(help="A bundled robot, or the path of a robot folder.")] = "irb140",
     spots: Annotated[
         int | None, typer.Option(help="How many there are; 20 if not given, or as many as the regions take.")
@@ -110,7 +111,8 @@ def place(
     if pictures:
         _draw(machine, found, chosen, out, screen)
     write_text(out / "report.json", json_module.dumps(report, indent=2) + "\n")
-    write_text(out / "spots.toml", spots_toml(found, chosen.tolist(), _remark(machine.title, result, seed, pairs)))
+    remark = _remark(machine.title, result, _command(context), pairs)
+    write_text(out / "spots.toml", spots_toml(found, chosen.tolist(), remark))
     if json:
         print_json(report)
     else:
@@ -152,14 +154,36 @@ def _draw(machine: Any, found: Any, chosen: Any, out: Path, screen: Console) -> 
     save_picture(out / "spots.png", machine, found.nodes, chosen)
 
 
-def _remark(title: str, result: Study, seed: int, pairs: int) -> str:
+#: What changes no placement.
+_BESIDES = ("out", "json", "pictures", "workers")
+
+
+def _command(context: typer.Context) -> str:
+    """The command that makes the placement again: the options that were given."""
+    words = ["qpsafe place"]
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        given = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+        if not given or name in _BESIDES:
+            continue
+        value = getattr(context.params[name], "value", context.params[name])
+        if parameter.param_type_name == "argument":
+            words.append(str(value))
+        elif isinstance(value, bool):
+            words.append((parameter.opts if value else parameter.secondary_opts)[0])
+        else:
+            words.append(f"{parameter.opts[0]} {value}")
+    return " ".join(words)
+
+
+def _remark(title: str, result: Study, command: str, pairs: int) -> str:
     """What stands at the head of the file."""
     answer, found = result.answer, result.candidates
     goal = "fewest spots for a probability, eq. (13)" if answer.objective == "probability" else answer.objective
     return (
-        f"{len(answer.solution.chosen)} spots on the {title}, chosen by `qpsafe place` out of {len(found)} nodes "
-        f"{1e3 * found.spacing:.0f} mm apart for the objective: {goal} (seed {seed}, {pairs} pairs, "
-        f"{answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
+        f"{len(answer.solution.chosen)} spots on the {title}, made by `{command}`: chosen out of {len(found)} nodes "
+        f"{1e3 * found.spacing:.0f} mm apart for the objective: {goal} ({pairs} pairs, {answer.solution.method}, gap "
+        f"{100 * answer.solution.gap:.1f} %). They detect "
         f"{100 * answer.fair.probability:.1f} % of an independent sample (95 %: {100 * answer.fair.low:.1f} to "
         f"{100 * answer.fair.high:.1f}). position [m] and direction (unit) are given in the frame of the link that "
         "carries the spot, eq. (7); link counts wire links from 1: the spot's danger vector acts there, eq. (8)."

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 SOURCE_NODES = 254
 COARSE = 0.015  # lattice that measures a region [m]
 FINE = 5.0  # the lattice that fills gaps is finer than the grid by this
-_ROUNDS = 12  # of the search for the spacing of a wanted number
+_PASSES, _ROUNDS = 6, 8  # of the search for the spacing of a wanted number
 
 
 class Sensor(NamedTuple):
@@ -95,15 +95,12 @@ def candidate_nodes(
         raise RobotFileError(robot.folder / "robot.toml", "regions", None, "at least one [[regions]] to put sensors on")
     if not (isinstance(wanted, int) and wanted >= 1):
         raise ConfigurationError("candidate_nodes", "wanted", wanted, "a number of nodes >= 1")
-    sight = SelfSight(robot, SensingRules().d_min)
+    sight = SelfSight(robot, SensingRules().d_min, sensor.range_max, sensor.field_of_view)
     patches = [_Patch(robot, region, sensor, sight) for region in robot.regions]
     if spacing is None:
         # the area that looks out, by a coarse lattice, says what to expect
-        area = sum(len(patch.usable_lattice(COARSE)[0]) for patch in patches) * COARSE**2
-        guess = float(np.sqrt(area / wanted))
-        for patch in patches:
-            patch.refine(guess / FINE)
-        spacing = _spacing_for(patches, wanted, guess)
+        area = sum(len(patch.fine[0]) for patch in patches) * COARSE**2
+        spacing = _spacing_for(patches, wanted, float(np.sqrt(area / wanted)))
     elif np.isfinite(spacing) and 1e-3 <= spacing <= 1.0:
         for patch in patches:
             patch.refine(spacing / FINE)
@@ -140,7 +137,7 @@ class _Patch:
         points, normals = points[inside], normals[inside]
         free = looks_out(points, normals, self.surface.body, self.reach)
         points, normals = points[free], normals[free]
-        clear = self.sight.share(self.region.frame, points, normals) <= self.region.self_sight
+        clear = self.sight.clear(self.region.frame, points, normals, self.region.self_sight)
         return points[clear], normals[clear]
 
     def refine(self, pitch: float) -> None:
@@ -186,7 +183,30 @@ def _sides(directions: Array) -> list[str]:
 
 
 def _spacing_for(patches: Sequence[_Patch], wanted: int, guess: float) -> float:
-    """The spacing whose grid has the wanted number of nodes, or the number nearest to it."""
+    """The spacing whose grid has the wanted number of nodes, or the number nearest to it.
+
+    The number jumps: some are skipped. Then the search starts anew with gaps filled by another lattice, as fine as the
+    last spacing suggests.
+    """
+    best = (wanted + 1, guess, guess)  # how far off, spacing, and the guess that the fine lattice was laid with
+    for _ in range(_PASSES):
+        for patch in patches:
+            patch.refine(guess / FINE)
+        counts = _search(patches, wanted, guess)
+        spacing = min(counts, key=lambda spacing: (abs(counts[spacing] - wanted), spacing))
+        best = min(best, (abs(counts[spacing] - wanted), spacing, guess))
+        if best[0] == 0 or spacing == guess:
+            break
+        guess = spacing
+    _, spacing, pitch = best
+    if pitch != guess:
+        for patch in patches:
+            patch.refine(pitch / FINE)
+    return spacing
+
+
+def _search(patches: Sequence[_Patch], wanted: int, guess: float) -> dict[float, int]:
+    """Numbers of nodes by spacing, around the wanted one if it can be had."""
     counts: dict[float, int] = {}
 
     def count(spacing: float) -> int:
@@ -194,21 +214,17 @@ def _spacing_for(patches: Sequence[_Patch], wanted: int, guess: float) -> float:
             counts[spacing] = sum(len(patch.grid(spacing)[0]) for patch in patches)
         return counts[spacing]
 
-    low, high = 0.5 * guess, 2.0 * guess
-    while high - low > 1e-3 * guess:  # the number falls with the spacing, if not everywhere
-        middle = 0.5 * (low + high)
-        if count(middle) >= wanted:
-            low = middle
-        else:
-            high = middle
+    spacing = guess
+    for _ in range(4):  # the number falls with the square of the spacing, on the whole
+        spacing *= float(np.clip(np.sqrt(count(spacing) / wanted), 0.5, 2.0))
     for step in range(1, 21):  # around there, on both sides in turn
         if wanted in counts.values():
-            break
-        count(low * (1.0 + (1 if step % 2 else -1) * 2e-3 * (step // 2)))
+            return counts
+        count(spacing * (1.0 + (1 if step % 2 else -1) * 2e-3 * (step // 2)))
     for _ in range(_ROUNDS):  # then between any two neighbours on different sides of the wanted number
-        if wanted in counts.values():
-            break
         for a, b in pairwise(sorted(counts)):
-            if abs(a - low) < 0.05 * guess and (counts[a] < wanted) != (counts[b] < wanted):
+            if wanted in counts.values():
+                return counts
+            if b - a > 1e-5 * spacing and (counts[a] < wanted) != (counts[b] < wanted):
                 count(0.5 * (a + b))
-    return min(counts, key=lambda spacing: (abs(counts[spacing] - wanted), spacing))
+    return counts

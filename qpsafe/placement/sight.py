@@ -1,19 +1,23 @@
-"""Whether a place on the robot can be used at all: how often it looks at the robot itself from close by.
+"""Whether a place on the robot can be used at all: how often a sensor there sees the robot itself.
 
 A reading below d_min always counts as danger, whatever is there (section II-B). A spot that sees its own robot that
-near stops it for nothing; one in the gap between two links does so all the time. So places that see the robot
-nearer than d_min at home, or in more than a share of random configurations (`self_sight` of the region), are no
-candidates.
+near stops it for nothing; one in the gap between two links does so all the time. Farther away the robot itself does
+not count, but hides people, and as its edge slides past, a slow sensor reads distances where nothing is. So a place
+is no candidate if a sensor's cone there meets the robot within its range in any of the poses around home, where it
+evades to, or nearer than d_min and a margin in more than a share of random poses (`self_sight` of the region).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
+from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.surface import model_body
 
 if TYPE_CHECKING:
@@ -21,26 +25,45 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CONFIGURATIONS = 100  # within limits, free of self-collision; one of them is home
+EVASIVE = 300  # poses around home, free of self-collision, beside home itself
+AROUND_HOME = 0.8  # largest deviation of a joint in these [rad]
+RANDOM = 100  # poses anywhere within limits, free of self-collision
+RIM = 6  # rays on the rim of a sensor's cone, beside that on its axis
+MARGIN = 0.02  # added to the distance below which the robot must not see itself [m]
+
+
+class _Pose(NamedTuple):
+    """The robot's collision geometry in one configuration: where its geoms are, and their axes, world frame."""
+
+    q: Array
+    centres: Array
+    axes: Array
 
 
 class SelfSight:
-    """The robot in random configurations.
+    """The robot in poses around home and in random ones.
+
+    Attributes:
+        configurations: All of them, home first, (c, n) [rad].
+        around_home: How many are home or around it; the others are random.
 
     Args:
         robot: Any robot whose model MuJoCo can read.
-        nearest: Nearer than this the robot must not see itself [m].
+        nearest: Nearer than this and a margin the robot must not see itself anywhere [m].
+        reach: Nearer than this it must not do so around home [m].
+        opening: Full angle of a sensor's cone [rad].
 
     Raises:
-        RobotFileError: MuJoCo cannot read the robot's model, or it touches itself in every configuration.
+        RobotFileError: MuJoCo cannot read the robot's model.
     """
 
-    def __init__(self, robot: Robot, nearest: float) -> None:
+    def __init__(self, robot: Robot, nearest: float, reach: float, opening: float) -> None:
         import mujoco
         import mujoco.batch
 
-        self.robot, self.nearest = robot, nearest
-        self._poses: dict[str, Array] = {}
+        self.robot, self.opening = robot, opening
+        self.nearest, self.reach = nearest + MARGIN, max(reach, nearest + MARGIN)
+        self._frames: dict[str, Array] = {}
         try:
             self._model: Any = mujoco.MjModel.from_xml_path(str(robot.model_path))
             self._q = np.array([self._model.joint(name).qposadr[0] for name in robot.joint_names], dtype=np.intp)
@@ -49,50 +72,86 @@ class SelfSight:
             raise RobotFileError(robot.model_path, "model", robot.model_path.name, expected) from None
         collides = (self._model.geom_contype != 0) | (self._model.geom_conaffinity != 0)
         self._model.geom_group[:] = np.where(collides | ~collides.any(), 3, 2)
-        self.configurations = self._free()
-        self._batch = mujoco.batch.Batch(self._model, len(self.configurations))
+        self._poses, self.around_home = self._free()
+        self.configurations = np.array([pose.q for pose in self._poses])
+        self._batch = mujoco.batch.Batch(self._model, len(self._poses))
         self._batch.bind("qpos")[:, self._q] = self.configurations
 
-    def _free(self) -> Array:
+    def _free(self) -> tuple[list[_Pose], int]:
+        """Home, poses around it and random ones, free of self-collision; and how many are not random."""
         import mujoco
 
         robot, model, data = self.robot, self._model, mujoco.MjData(self._model)
-        rng, found = np.random.default_rng(0), [robot.home]
-        data.qpos[self._q] = robot.home
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_collision(model, data)
-        by_design = {tuple(pair) for pair in model.geom_bodyid[data.contact.geom]}
-        for _ in range(20 * CONFIGURATIONS):
-            q = rng.uniform(robot.lower, robot.upper)
+        rng, home = np.random.default_rng(0), robot.home
+
+        def touching(q: Array) -> set[tuple[int, ...]]:
             data.qpos[self._q] = q
             mujoco.mj_kinematics(model, data)
             mujoco.mj_collision(model, data)
-            if {tuple(pair) for pair in model.geom_bodyid[data.contact.geom]} <= by_design:
-                found.append(q)
-            if len(found) == CONFIGURATIONS:
-                break
-        return np.array(found)
+            return {tuple(pair) for pair in model.geom_bodyid[data.contact.geom]}
 
-    def share(self, frame: str, points: Array, directions: Array) -> Array:
-        """Share of the configurations in which places see the robot from close by, but for their own body, (k,).
+        by_design = touching(home)
 
-        1 for a place that does so at home.
+        def free(low: Array, high: Array) -> Iterator[_Pose]:
+            for q in rng.uniform(low, high, (4000, len(home))):
+                if touching(q) <= by_design:
+                    yield taken(q)
+
+        def taken(q: Array) -> _Pose:
+            return _Pose(q, data.geom_xpos.copy(), data.geom_xmat.reshape(-1, 3, 3).copy())
+
+        touching(home)
+        near = np.maximum(robot.lower, home - AROUND_HOME), np.minimum(robot.upper, home + AROUND_HOME)
+        around = [taken(home), *islice(free(*near), EVASIVE)]
+        return [*around, *islice(free(robot.lower, robot.upper), RANDOM)], len(around)
+
+    def clear(self, frame: str, points: Array, directions: Array, most: float) -> NDArray[np.bool_]:
+        """Which places see the robot in no pose around home, and from close by in few random ones, (k,).
+
+        The body that carries a place is left out: a place on it that looks at it is no matter of poses.
 
         Args:
             frame: Frame of the robot that the places are fixed in.
             points: (k, 3) [m].
             directions: Unit, (k, 3).
+            most: The largest share of the random poses in which a place may see it.
         """
-        if not len(points):
-            return np.zeros(0)
-        if frame not in self._poses:
-            self._poses[frame] = np.array([self.robot.pose(frame, q) for q in self.configurations])
-        poses = self._poses[frame]
-        R, t = poses[:, :3, :3], poses[:, :3, 3]
-        origins = points @ R.transpose(0, 2, 1) + t[:, None, :]
-        rays = directions @ R.transpose(0, 2, 1)
-        own = model_body(self._model, self.robot, frame)
+        model, own = self._model, model_body(self._model, self.robot, frame)
+        if frame not in self._frames:
+            self._frames[frame] = np.array([self.robot.pose(frame, pose.q) for pose in self._poses])
+        others = np.flatnonzero((model.geom_group == 3) & (model.geom_bodyid != own))
+        boxes = model.geom_aabb[others].copy()
+        boxes[model.geom_rbound[others] == 0.0, 3:] = np.inf  # a plane
         seen = np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
-        distance, _ = self._batch.ray(origins, rays, geomgroup=seen, bodyexclude=own)
-        near = np.asarray((distance >= 0.0) & (distance < self.nearest))
-        return np.where(near[0], 1.0, near.mean(axis=0))
+        cone = _cone(directions, self.opening)  # (k, rays, 3)
+        left, times = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
+        allowed = most * (len(self._poses) - self.around_home)
+        for i, (pose, T) in enumerate(zip(self._poses, self._frames[frame], strict=True)):
+            places = points[left] @ T[:3, :3].T + T[:3, 3]
+            reach, most = (self.reach, 0.0) if i < self.around_home else (self.nearest, allowed)
+            # rays only where the robot may be: this near to its axis lies what a cone holds
+            widest = reach * np.sin(0.5 * self.opening)
+            axes = directions[left] @ T[:3, :3].T
+            near = may_meet(places, axes, pose.centres[others], pose.axes[others], boxes, reach, widest)
+            some = left[near]
+            if not len(some):
+                continue
+            rays = (cone[some] @ T[:3, :3].T).reshape(-1, 3)
+            origins = np.repeat(places[near], RIM + 1, axis=0)
+            distance, _ = self._batch.ray(origins, rays, geomgroup=seen, bodyexclude=own, ids=[i])
+            meets = ((distance >= 0.0) & (distance < reach)).reshape(-1, RIM + 1).any(axis=1)
+            times[some[meets]] += 1
+            left = left[times[left] <= most]
+        clear = np.zeros(len(points), dtype=np.bool_)
+        clear[left] = True
+        return clear
+
+
+def _cone(directions: Array, opening: float) -> Array:
+    """Each direction and some on the rim of its cone, (k, 1 + RIM, 3)."""
+    aside = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    up, angle = np.cross(directions, aside), 2.0 * np.pi * np.arange(RIM) / RIM
+    rim = np.cos(angle)[:, None] * aside[:, None] + np.sin(angle)[:, None] * up[:, None]
+    rim = np.cos(0.5 * opening) * directions[:, None] + np.sin(0.5 * opening) * rim
+    return np.concatenate((directions[:, None], rim), axis=1)

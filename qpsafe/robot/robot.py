@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,16 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
+
+    def with_spots(self, file: str | Path) -> Robot:
+        """The same robot with the distance sensors of another file.
+
+        Args:
+            file: A name in the robot's folder, or a path. Read, and checked, when its spots are loaded.
+        """
+        other, own = copy(self), self.folder / file
+        other.spots_path = own if own.is_file() else Path(file)
+        return other
 
     def at(self, q: ArrayLike) -> RobotState:
         """Kinematics at configuration q, computed once.

@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 
 from qpsafe import __version__
 from qpsafe.cli.main import app
+from qpsafe.errors import QpsafeError
+from qpsafe.sim.run_file import read_run
 
 run = CliRunner().invoke
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
@@ -52,6 +54,17 @@ def test_demo_writes_report_figures_and_signals(tmp_path: Path) -> None:
         "run.npz",
         "signals.csv",
     ]
+
+
+def test_demo_takes_other_sensors(tmp_path: Path) -> None:
+    """A name in the robot's folder or a path; a run keeps which; they fit one robot."""
+    quick = ["demo", "fixed", "--duration", "0.1", "--no-video", "--out", str(tmp_path / "a")]
+    result = run(app, [*quick, "--spots", "spots-by-hand.toml"])
+    assert result.exit_code == 0, result.output
+    assert read_run(tmp_path / "a" / "run.npz").header["settings"]["spots"] == "spots-by-hand.toml"
+    assert run(app, ["replay", str(tmp_path / "a" / "run.npz")]).exit_code == 0
+    for wrong in (["--spots", str(tmp_path / "none.toml")], ["--spots", "spots-by-hand.toml", "--robot", "all"]):
+        assert isinstance(run(app, [*quick, *wrong]).exception, QpsafeError)
 
 
 def test_demo_without_opengl_says_so_in_one_line(tmp_path: Path) -> None:

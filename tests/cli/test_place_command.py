@@ -27,11 +27,24 @@ def test_a_placement_is_written_and_loads(tmp_path: Path) -> None:
     spots = qpsafe.SpotArray.load(tmp_path / "out" / "spots.toml", qpsafe.load_robot("irb140"))
     assert sorted(spots.names) == sorted(report["placements"]["detection"]["spots"])
     assert len(spots) == 8
+    head = (tmp_path / "out" / "spots.toml").read_text(encoding="utf-8").replace("\n# ", " ")
+    assert "`qpsafe place --spots 8 --nodes 40 --pairs 60 --no-exact`" in head
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"spots.toml", "report.json", "figure-9.png"}
     for curve in report["curves"].values():
         assert len(curve["probability"][1]) == report["nodes"] + 1
         low, high = curve["confidence"]
         assert all(a <= p <= b for a, p, b in zip(low, curve["probability"][1], high, strict=True))
+
+
+@pytest.mark.slow
+def test_the_bundled_spots_are_what_the_command_at_their_head_makes(tmp_path: Path) -> None:
+    bundled = (qpsafe.load_robot("irb140").folder / "spots.toml").read_text(encoding="utf-8")
+    command = bundled.replace("\n# ", " ").partition("`")[2].partition("`")[0]
+    name, *arguments = command.split()
+    assert name == "qpsafe"
+    result = CliRunner().invoke(app, [*arguments, "--no-pictures", "--out", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "spots.toml").read_text(encoding="utf-8") == bundled
 
 
 def test_fewest_spots_for_a_probability(tmp_path: Path) -> None:

@@ -101,6 +101,12 @@ def irb140() -> Any:
 
 
 @pytest.fixture(scope="session")
+def by_hand(irb140: Any) -> qpsafe.SpotArray:
+    """The bundled robot's twenty spots placed by hand: on every link some that look to the sides, and upright ones."""
+    return qpsafe.SpotArray.load(irb140.folder / "spots-by-hand.toml", irb140)
+
+
+@pytest.fixture(scope="session")
 def run(irb140: Any) -> Callable[..., Run]:
     """Makes a closed loop: `run(law=None, q=None, **options of SafetyController)`."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -12,8 +13,10 @@ import qpsafe
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.placement.candidates import Candidates, candidate_nodes, node_pose
 from qpsafe.placement.grid import NEAREST, lattice, thin_out
+from qpsafe.placement.sight import SelfSight
+from qpsafe.placement.sight import _cone as self_sight_cone
 from qpsafe.placement.spots_toml import spots_toml
-from qpsafe.placement.surface import link_surface
+from qpsafe.placement.surface import link_surface, model_body
 from qpsafe.robot.robot import Robot
 
 ROBOT = qpsafe.load_robot("irb140")
@@ -65,6 +68,45 @@ def test_directions_point_out_of_the_body(nodes: Candidates) -> None:
         own = hulls.take(np.flatnonzero(hulls.bodies == body).tolist())
         assert own.find((origin + 0.001 * direction)[None], zero, state.body_poses())[0] < 0
         assert own.find((origin - 0.002 * direction)[None], zero, state.body_poses())[0] >= 0
+
+
+def test_the_spacing_is_found_that_gives_the_wanted_number() -> None:
+    assert len(candidate_nodes(ROBOT, 41)) == 41
+
+
+def test_self_sight_is_that_of_every_ray_cast_in_every_pose() -> None:
+    """Culled and given up early as it is, against mj_ray cast one by one along all rays in all poses."""
+    sight = SelfSight(ROBOT, 0.16, 0.8, np.deg2rad(6.0))
+    region = next(region for region in ROBOT.regions if region.name == "wrist")
+    points, normals = lattice(
+        (surface := link_surface(ROBOT, region)).skin, surface.normals(), np.stack((region.lower, region.upper)), 0.035
+    )
+    model, own = mujoco.MjModel.from_xml_path(str(ROBOT.model_path)), 0
+    data, group = mujoco.MjData(model), np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
+    model.geom_group[:] = np.where((model.geom_contype != 0) | (model.geom_conaffinity != 0), 3, 2)
+    own = model_body(model, ROBOT, region.frame)
+    cone, hit = self_sight_cone(normals, np.deg2rad(6.0)), np.zeros(1, dtype=np.int32)
+    near = np.zeros((len(sight.configurations), len(points)), dtype=bool)
+    for i, q in enumerate(sight.configurations):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        T = ROBOT.pose(region.frame, q)
+        for k, (point, rays) in enumerate(zip(points @ T[:3, :3].T + T[:3, 3], cone @ T[:3, :3].T, strict=True)):
+            found = [mujoco.mj_ray(model, data, point, ray, group, 1, own, hit, None) for ray in rays]
+            reach = 0.8 if i < sight.around_home else 0.18
+            near[i, k] = any(0.0 <= distance < reach for distance in found)
+    around, elsewhere = near[: sight.around_home], near[sight.around_home :]
+    for most in (0.0, 0.05, 0.5):
+        expected = ~around.any(axis=0) & (elsewhere.mean(axis=0) <= most)
+        assert (sight.clear(region.frame, points, normals, most) == expected).all()
+        assert 0 < expected.sum() < len(points)
+
+
+def test_the_bundled_spots_do_not_see_the_robot_from_close_by() -> None:
+    spots, sight = qpsafe.load_spots(ROBOT), SelfSight(ROBOT, 0.16, 0.8, np.deg2rad(6.0))
+    assert spots is not None
+    for i, frame in enumerate(spots.frames):
+        assert sight.clear(frame, spots.positions[i : i + 1], spots.directions[i : i + 1], 0.3).all(), spots.names[i]
 
 
 def test_a_flat_square_is_a_square_lattice() -> None:

@@ -172,11 +172,9 @@ def test_the_robot_itself_does_not_count_and_what_is_before_it_does(irb140: Any)
     assert found > 8
 
 
-def test_what_a_tool_carries_is_part_of_the_robot() -> None:
+def test_what_a_tool_carries_is_part_of_the_robot(irb140: Any, by_hand: Any) -> None:
     """A spot that looks at a workpiece in the gripper sees danger, unless it has been told of it; it moves along."""
-    robot = qpsafe.load_robot("irb140")
-    spots = qpsafe.load_spots(robot)
-    assert spots is not None
+    robot, spots = irb140, by_hand  # of these none looks at the robot itself in these poses
     for q, spot in product((robot.home, robot.home + 0.3), range(len(spots))):
         state = robot.at(q)
         tip, (origins, axes) = state.pose("tcp"), spots.rays(state)

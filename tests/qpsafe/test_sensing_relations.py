@@ -153,9 +153,9 @@ def test_an_approaching_hand_is_more_dangerous_with_the_velocity_estimate_a_leav
         assert moving > 1.2 * still if speed < 0.0 else moving == pytest.approx(still, abs=1e-9)
 
 
-def test_the_robots_own_motion_is_no_approach(irb140: Any) -> None:
+def test_the_robots_own_motion_is_no_approach(irb140: Any, by_hand: Any) -> None:
     """A spot that turns past a standing wall, square to it, sees it come nearer; the wall does not move."""
-    sensing = DistanceSensing(irb140, qpsafe.load_spots(irb140), 0.004, SensingRules(velocities=True))
+    sensing = DistanceSensing(irb140, by_hand, 0.004, SensingRules(velocities=True))
     wall = 1.1  # x [m]
     for k in range(150):
         q = irb140.home + 0.3 * 0.004 * k * np.array([0.0, 1.0, -1.0, 0.0, 0.0, 0.0])  # forwards, level

@@ -53,11 +53,11 @@ def test_a_sick_reading_is_named_at_once_held_and_dies_in_5_ticks(irb140: Any, k
     for tick in range(1, 60):
         seen = feed(value, age)
         assert words in seen.notes[0]
-        assert seen.notes[0].endswith("flange")
+        assert seen.notes[0].endswith(feed.sensing.spots.names[SPOT])
         assert seen.severity == (CAPPED if tick >= 5 else CLEAR)
         assert not seen.too_many
         assert (len(seen.points) == 1) == (tick <= 38)  # 0.15 s
-        assert feed.sensing.unseen == ("flange",)
+        assert feed.sensing.unseen == (feed.sensing.spots.names[SPOT],)
 
 
 @pytest.mark.parametrize("gone", [np.nan, np.inf, 0.79])
@@ -140,7 +140,8 @@ def test_stuck_is_the_same_value_while_the_robot_moves(irb140: Any) -> None:
         origin = point if origin is None else origin
         seen = sensing.update(state, state.wire(REST), distances)
         due = tick + 1 >= 25 and np.linalg.norm(point - origin) >= 0.02
-        assert (sensing.unseen == ("flange",)) == due or abs(np.linalg.norm(point - origin) - 0.02) < 1e-9
+        dead = sensing.unseen == (sensing.spots.names[SPOT],)
+        assert dead == due or abs(np.linalg.norm(point - origin) - 0.02) < 1e-9
     assert "dead (stuck)" in seen.notes[0]
     still = Feed(irb140)
     for _ in range(200):

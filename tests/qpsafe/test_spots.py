@@ -237,19 +237,23 @@ def test_the_tools_of_this_test(body: Any) -> None:
     assert np.median(inner) == pytest.approx(1.0)  # the body's meshes are closed
 
 
-def test_the_bundled_spots_sit_on_the_skin_and_look_outwards(irb140: Any, body: Any) -> None:
+@pytest.mark.parametrize("placed", ["by hand", "optimised"])
+def test_the_bundled_spots_sit_on_the_skin_and_look_outwards(irb140: Any, by_hand: Any, body: Any, placed: str) -> None:
     model, data, meshes = body
-    spots = qpsafe.load_spots(irb140)
+    spots = by_hand if placed == "by hand" else qpsafe.load_spots(irb140)
     assert len(spots) == 20
     assert len(set(spots.names)) == 20
     origins, directions = spots.rays(irb140.at(np.zeros(6)))
     everything = np.concatenate(meshes)
     for name, origin, direction in zip(spots.names, origins, directions, strict=True):
+        origin = origin + 1e-4 * direction  # those of `qpsafe place` lie in the surface, rounded
         assert max(abs(winding(origin, triangles)) for triangles in meshes) < 1e-6, name  # outside
         outwards = origin - nearest_on(everything, origin)
         distance = float(np.linalg.norm(outwards))
         assert distance < 0.015, name
         assert outwards @ direction > 0.25 * distance, name
+        if placed == "optimised":
+            continue  # by other rules, see test_placement_nodes.py
         group, hit = np.array([0, 0, 1, 0, 0, 0], dtype=np.uint8), np.zeros(1, dtype=np.int32)
         # it does not look at the robot itself: nothing of it within the sensor's range
         assert mujoco.mj_ray(model, data, origin, direction, group, 1, -1, hit, None) < 0.0, name

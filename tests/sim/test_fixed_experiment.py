@@ -1,5 +1,6 @@
 """The source's first experiment, whole: what it must show, checked on the log."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.known import known_obstacles
 from qpsafe.sim.log import RunLog, intervals
 from qpsafe.sim.report import summarise
+from qpsafe.sim.robot_stage import robot_stage
 
 LEVEL = {"low": 0, "medium": 1, "high": 2}
 ROBOT = qpsafe.load_robot("irb140")
@@ -107,10 +109,14 @@ def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
 
 def test_the_robot_sees_itself_and_it_does_not_count() -> None:
     """A longer hold bends the arm farther back: the upper arm's rear spot sees the robot's own body for a second."""
-    experiment = FixedExperiment(ROBOT, rules=qpsafe.SensingRules(hold_time=0.3), duration=11.0)
+    robot, stage = ROBOT.with_spots("spots-by-hand.toml"), robot_stage(ROBOT).choreography
+    farther = replace(stage.approaches[0], medium_distance=1.02)
+    stage = replace(stage, approaches=(farther,))
+    rules = qpsafe.SensingRules(hold_time=0.3)
+    experiment = FixedExperiment(robot, rules=rules, duration=11.0, choreography=stage)
     log = experiment.run()
     assert set(log.status) == {"ok"}
-    spots = qpsafe.load_spots(ROBOT)
+    spots = qpsafe.load_spots(robot)
     sensing = DistanceSensing(ROBOT, spots, log.dt, known=known_obstacles(experiment.scene))
     own: dict[str, int] = {}
     for q, distances in zip(log.q, log.distances, strict=True):
@@ -134,8 +140,6 @@ def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperimen
 
 def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment) -> None:
     """A log with each promise broken in turn must not pass as kept."""
-    from dataclasses import replace
-
     without = experiment.board_distance_without_controller()
 
     def broken(log: RunLog, without: np.ndarray = without) -> set[str]:

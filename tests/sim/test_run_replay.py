@@ -184,6 +184,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     [
         FixedExperiment(ROBOT, qpsafe.WeightedLaw(200.0), seed=4, limits=False, cap=15.0, duration=7.0),
         FixedExperiment(ROBOT, choreography=Choreography((Approach(0.3, 1.0, 0.9, 0.8),))),
+        FixedExperiment(ROBOT.with_spots("spots-by-hand.toml"), duration=1.0),
         FixedExperiment(ROBOT, qpsafe.NullspaceLaw(), rules=qpsafe.SensingRules(hold_time=0.3)),
         PathExperiment(ROBOT, qpsafe.HierarchicalLaw("paper"), recovery=qpsafe.RecoveryRules(enabled=False)),
     ],
@@ -193,6 +194,7 @@ def test_settings_survive_json(experiment: FixedExperiment) -> None:
     again = experiment_of(json.loads(json.dumps(found)))
     assert type(again) is type(experiment)
     assert json.dumps(settings_of(again)) == json.dumps(found)
+    assert again.robot.spots_path == experiment.robot.spots_path
     for t in (0.0, 3.0, 6.0):
         for a, b in zip(experiment.walk.poses(t), again.walk.poses(t), strict=True):
             assert np.array_equal(a.ends, b.ends)
