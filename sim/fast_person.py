@@ -118,5 +118,5 @@ def fast_figure(found: list[FastRun], path: Path) -> None:
         lower.set(
             ylabel="robot's fastest point\nthen, or at contact [m/s]", xlabel="walking speed [m/s]", ylim=(0.0, None)
         )
-        upper.legend(loc="upper right", bbox_to_anchor=(1.0, 1.0))
+        upper.legend(loc="lower left")  # where people are slow the robot is far away
         save(figure, path)
