@@ -60,5 +60,5 @@ def side_by_side(runs: Mapping[str, PathRun], robot: Robot, path: Path) -> None:
         axes[3, 0].legend(loc="lower left", ncols=2)
         for word, colour in (("medium danger", MEDIUM), ("high danger", HIGH)):
             axes[0, 0].fill_between([], [], color=colour, label=word)
-        axes[0, 0].legend(loc="upper left")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
         save(figure, path)

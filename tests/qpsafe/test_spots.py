@@ -1,5 +1,6 @@
 """Spots: eq. (7) against the chain of homogeneous matrices, mistakes in spots.toml, and the IRB 140's own twenty."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -259,5 +260,18 @@ def test_the_bundled_spots_sit_on_the_skin_and_look_outwards(irb140: Any, by_han
         assert mujoco.mj_ray(model, data, origin, direction, group, 1, -1, hit, None) < 0.0, name
 
 
-def test_every_moving_link_carries_a_spot(irb140: Any) -> None:
-    assert set(qpsafe.load_spots(irb140).links.tolist()) == set(range(len(irb140.wire_frames)))
+def test_by_hand_every_moving_link_carries_a_spot(irb140: Any) -> None:
+    spots = qpsafe.load_spots(irb140.with_spots("spots-by-hand.toml"))
+    assert set(spots.links.tolist()) == set(range(len(irb140.wire_frames)))
+
+
+def test_optimised_spots_keep_to_what_the_regions_say(irb140: Any) -> None:
+    """At most so many in each region, none beyond the wrist; `spots.toml` names a spot by its region."""
+    spots, regions = qpsafe.load_spots(irb140), irb140.regions
+    assert sum(region.at_most for region in regions) >= len(spots)
+    for region in regions:
+        own = re.compile(rf"{region.name} (front|rear|left|right|top|bottom) \d+")
+        inside = [name for name in spots.names if own.fullmatch(name)]
+        assert len(inside) <= region.at_most, region.name
+        assert {int(spots.links[spots.names.index(name)]) for name in inside} <= {region.link}
+    assert spots.links.max() == 3
