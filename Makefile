@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= out/demo-fixed
+TYPED  := build/typed
 
-.PHONY: demo test test-slow dev links lint bench clean
+.PHONY: demo test test-slow dev lint bench clean
 
 demo: $(VENV)/.demo ## the source's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
@@ -15,18 +16,21 @@ test: $(VENV)/.dev
 test-slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2
 
-dev: $(VENV)/.dev links ## everything for working on the project
+dev: $(VENV)/.dev ## everything for working on the project
 	@echo "ready: $(BIN)/qpsafe --help"
 
-lint: $(VENV)/.dev links
+lint: $(VENV)/.dev $(TYPED)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy -p qpsafe
+	cd $(TYPED) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p qpsafe
 
-links: ## git-ignored: static checkers do not follow setuptools' package-dir
-	@ln -sfn ../tasks qpsafe/tasks
-	@ln -sfn ../robots qpsafe/robots
-	@ln -sfn ../sim qpsafe/sim
+# Static checkers do not follow setuptools' package-dir: they are shown the packages as they lie in the wheel. The links
+# are kept out of the source tree, where tests would come to need them.
+.PHONY: $(TYPED)
+$(TYPED):
+	@rm -rf $@ && mkdir -p $@/qpsafe
+	@ln -s $(CURDIR)/qpsafe/* $@/qpsafe/
+	@for name in tasks robots sim; do ln -sfn $(CURDIR)/$$name $@/qpsafe/$$name; done
 
 bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --json bench.json

@@ -14,6 +14,9 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+#: In a source tree the last three lie beside `qpsafe`, where walking through its folder does not lead.
+PACKAGES = ("qpsafe", "qpsafe.tasks", "qpsafe.robots", "qpsafe.sim")
+
 
 class Start(NamedTuple):
     """A process that makes all kernels ready.
@@ -30,17 +33,16 @@ class Start(NamedTuple):
 
 
 def modules() -> list[str]:
-    """Names of all modules of the project that have kernels, by their text: nothing of them is imported."""
-    import qpsafe
-
-    found = []
-    for module in pkgutil.walk_packages(qpsafe.__path__, "qpsafe."):
-        spec = importlib.util.find_spec(module.name)
-        if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
-            continue
-        if re.search(r"^@entry\(|= entry\(", Path(spec.origin).read_text(encoding="utf-8"), re.MULTILINE):
-            found.append(module.name)
-    return found
+    """Names of all modules of the project that have kernels, by their text: none of them is imported."""
+    found = set()
+    for package in PACKAGES:
+        for module in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
+            spec = importlib.util.find_spec(module.name)
+            if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
+                continue
+            if re.search(r"^@entry\(|= entry\(", Path(spec.origin).read_text(encoding="utf-8"), re.MULTILINE):
+                found.add(module.name)
+    return sorted(found)
 
 
 def time_compilation() -> tuple[Start, Start]:

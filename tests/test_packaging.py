@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from importlib import metadata
@@ -30,12 +31,11 @@ HEAVY = {"mujoco", "pinocchio", "numba", "scipy", "matplotlib", "qpsolvers", "mi
 
 
 def modules() -> dict[str, Path]:
-    """Place in the wheel -> file, of every module in the tree; `make dev` puts links in qpsafe/, which do not count."""
-    links = {path for path in (ROOT / "qpsafe").iterdir() if path.is_symlink()}
+    """Place in the wheel -> file, of every module in the tree."""
     found = {}
     for package, folder in FOLDERS.items():
         for path in (ROOT / folder).rglob("*.py"):
-            if not links & set(path.parents) and (path.parent / "__init__.py").exists():
+            if (path.parent / "__init__.py").exists():
                 found[f"{package.replace('.', '/')}/{path.relative_to(ROOT / folder).as_posix()}"] = path
     return found
 
@@ -75,6 +75,23 @@ def test_one_range_of_pythons() -> None:
     assert {f"3.{minor}" for minor in range(8, 20) if allowed.contains(f"3.{minor}.1")} == listed
     first, last = re.findall(r"\(3, (\d+)\)", (ROOT / "Makefile").read_text(encoding="utf-8"))
     assert {f"3.{minor}" for minor in range(int(first), int(last) + 1)} == listed
+
+
+def test_the_gate_does_what_the_readme_says_in_its_order_then_lint() -> None:
+    blocks = re.findall(r"```bash\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    promised = [line.partition("#")[0].strip() for line in blocks[0].splitlines()]
+    gate = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert re.findall(r"^make .*$", gate, re.MULTILINE) == [*promised, "make lint"]
+
+
+def test_nothing_puts_links_into_the_source_tree() -> None:
+    """A test could come to need them, and fail in every fresh clone."""
+    for name in ("dev", "demo", "test", "lint"):
+        recipe = subprocess.run(["make", "--dry-run", "--always-make", name], cwd=ROOT, capture_output=True, text=True)
+        assert recipe.returncode == 0, recipe.stderr
+        for line in recipe.stdout.splitlines():
+            assert not re.search(r"\bln\b", line) or " build/typed/" in line, line
+    assert not [path for path in (ROOT / "qpsafe").iterdir() if path.is_symlink()], "left over from an older Makefile"
 
 
 def requirements(*extras: str) -> list[Requirement]:
@@ -145,13 +162,30 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, copy)
     for name in FOLDERS.values():
-        links = ("tasks", "robots", "sim") if name == "qpsafe" else ()
-        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]", *links))
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]"))
     options = ["--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--quiet"]
     command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(out), str(copy)]
     subprocess.run(command, check=True, timeout=300)
     (path,) = out.glob("*.whl")
     return path
+
+
+def test_an_unpacked_sdist_is_a_whole_source_tree(tmp_path: Path) -> None:
+    """Whatever is tracked is in it, so that its README's commands work."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0:
+        pytest.skip("this tree is an unpacked sdist itself")
+    tree = tmp_path / "tree"
+    for name in listed.stdout.splitlines():
+        if (ROOT / name).exists():  # not yet staged as deleted
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, tree / name)
+    code = f"from setuptools import build_meta; build_meta.build_sdist({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=tree, check=True, timeout=300, capture_output=True)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        names = {name.partition("/")[2] for name in packed.getnames()}
+    assert set(listed.stdout.splitlines()) - names == set()
 
 
 def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None:

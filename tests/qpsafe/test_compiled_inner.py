@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 from typing import NamedTuple
 
 import numba
@@ -13,7 +14,7 @@ from numba import types
 from qpsafe.danger.compiled import OPTIONS, entry, inline, seconds
 from qpsafe.danger.memory import view
 from qpsafe.danger.reference import by_reference
-from qpsafe.timing_compile import modules
+from qpsafe.timing_compile import PACKAGES, modules
 
 
 def mixed(a: np.ndarray, b: np.ndarray, k: int) -> float:
@@ -94,7 +95,15 @@ def test_a_reference_stands_for_the_tuple() -> None:
 
 
 def test_every_kernel_is_timed() -> None:
+    """Wherever packages lie: in the folders of a fresh clone, without links, or in a wheel."""
     found = modules()
+    folders = {package: Path(importlib.import_module(package).__path__[0]) for package in PACKAGES}
+    assert found == sorted(
+        ".".join((package, *path.relative_to(folder).with_suffix("").parts))
+        for package, folder in folders.items()
+        for path in folder.rglob("*.py")
+        if "entry(" in path.read_text("utf-8") and "def entry(" not in path.read_text("utf-8")
+    )
     for name in found:
         importlib.import_module(name)
     own = {kernel.rsplit(".", 1)[0] for kernel in seconds if kernel.startswith("qpsafe.")}
