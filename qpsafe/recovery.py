@@ -43,8 +43,8 @@ class Recovery:
     def __init__(
         self, tasks: Sequence[Task], suspend_above: float, dt: float, rules: RecoveryRules | None = None
     ) -> None:
-        self.dt = dt
-        self.rules = RecoveryRules() if rules is None else rules
+        self._dt = dt
+        self._rules = RecoveryRules() if rules is None else rules
         self.phase = FOLLOWING
         self._kept = math.exp(-dt / self.rules.fade)  # of the speed of a held task, from tick to tick
         self.path_time = 0.0
@@ -83,6 +83,16 @@ class Recovery:
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
         self._last: list[Any] = [None] * len(self.tasks)  # state and reference of suspended tasks, last tick
         self._changed = True
+
+    @property
+    def dt(self) -> float:
+        """Tick [s]."""
+        return self._dt
+
+    @property
+    def rules(self) -> RecoveryRules:
+        """How to return."""
+        return self._rules
 
     @property
     def clocks(self) -> tuple:
