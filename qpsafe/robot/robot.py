@@ -77,6 +77,9 @@ class Robot(Fixed):
         self.tool: Tool | None = spec.tools[0] if spec.tools else None
         self.tool_frames = tuple(tool.frame for tool in spec.tools) or _tips(spec.wire_frames)
         self.chains = spec.chains
+        for value in (value for part in (*spec.chains, *spec.regions, *spec.tools) for value in part):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
         self.dh = _read_only(spec.chains[0].table) if len(spec.chains) == 1 else None
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
