@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.danger.activation import Activation
+from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.compiled import Array, entry, readable
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.problem import Law, LawResult
-from qpsafe.limits import JointLimits
+from qpsafe.returns import RecoveryRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
 
@@ -26,6 +28,8 @@ _FLOAT = np.dtype(np.float64)
 
 #: A law that moves a joint by more than this in one tick is broken [rad].
 ABSURD_STEP = 1e3
+#: A tick that is longer is meant in other units [s].
+LONGEST_TICK = 0.1
 
 
 def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
@@ -40,22 +44,26 @@ def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
 def checked_activation(tasks: tuple[Task, ...], activation: Activation | None, robot: Robot) -> Activation:
     """The given activation, or the default one, if it has as many thresholds as there are tasks."""
     activation = default_activation(tasks, robot) if activation is None else activation
+    if not isinstance(activation, Activation):
+        raise ConfigurationError("SafetyController", "activation", activation, "an Activation")
     if len(activation.thresholds) != len(tasks):
         found = f"{len(activation.thresholds)} thresholds"
         raise ConfigurationError("SafetyController", "activation", found, f"{len(tasks)}")
     return activation
 
 
-def check_arguments(robot: Robot, tasks: Sequence[Task], law: Law | None, dt: float) -> None:
-    """Refuse a configuration that cannot work, by name."""
-    if not hasattr(robot, "wire_frames"):
-        raise ConfigurationError("SafetyController", "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
+def checked_dt(where: str, dt: float) -> float:
+    """A tick as a float."""
+    number = isinstance(dt, Real) and not isinstance(dt, bool | np.bool_)
+    if not (number and 0.0 < float(dt) <= LONGEST_TICK):  # false for NaN
+        raise ConfigurationError(where, "dt", dt, f"a time in seconds, above 0, up to {LONGEST_TICK}; 4 ms is 0.004")
+    return float(dt)
+
+
+def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
+    """Refuse tasks that the robot cannot do."""
     if not (isinstance(tasks, Sequence) and len(tasks) > 0):
         raise ConfigurationError("SafetyController", "tasks", tasks, "a list of at least one task")
-    if not (isinstance(dt, int | float) and not isinstance(dt, bool) and np.isfinite(dt) and dt > 0.0):
-        raise ConfigurationError("SafetyController", "dt", dt, "a finite time > 0 [s]")
-    if law is not None and not callable(getattr(law, "solve", None)):
-        raise ConfigurationError("SafetyController", "law", law, "a law with solve(problem), e.g. HierarchicalLaw()")
     for k, task in enumerate(tasks):
         if not isinstance(task, Task):
             raise ConfigurationError("SafetyController", f"tasks[{k}]", task, "a Task, e.g. PositionTask")
@@ -67,25 +75,54 @@ def check_arguments(robot: Robot, tasks: Sequence[Task], law: Law | None, dt: fl
             raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)
 
 
-def check_parts(
-    robot: Robot, dt: float, field: object, activation: object, evasion: object, limits: JointLimits | str | None
-) -> None:
-    """Refuse parts of the wrong kind, and parts made for another robot or another tick, by name."""
-    n = robot.nq
-    if field is not None and not callable(getattr(field, "evaluate", None)):
+def checked_robot(where: str, robot: Robot) -> Robot:
+    """`robot`, if it is one."""
+    if not hasattr(robot, "wire_frames"):
+        raise ConfigurationError(where, "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
+    return robot
+
+
+def checked_law(law: Law) -> Law:
+    """`law`, if it can be asked."""
+    if isinstance(law, type) or not callable(getattr(law, "solve", None)):
+        raise ConfigurationError("SafetyController", "law", law, "a law with solve(problem), e.g. HierarchicalLaw()")
+    return law
+
+
+def checked_field(field: Any) -> Any:
+    """`field`, if it can be asked."""
+    if isinstance(field, type) or not callable(getattr(field, "evaluate", None)):
         raise ConfigurationError("SafetyController", "field", field, "a DangerField")
-    if activation is not None and not isinstance(activation, Activation):
-        raise ConfigurationError("SafetyController", "activation", activation, "an Activation")
-    if evasion is not None and not (isinstance(evasion, Evasion) and evasion.velocity.shape == (n,)):
-        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {n} joints")
-    if limits is None or (isinstance(limits, str) and limits == "robot"):
-        return
-    if not isinstance(limits, JointLimits):
-        raise ConfigurationError("SafetyController", "limits", limits, '"robot", a JointLimits or None')
-    if limits.lower.shape != (n,):
-        raise ConfigurationError("SafetyController", "limits", f"limits of shape {limits.lower.shape}", f"({n},)")
-    if limits.dt != dt:
-        raise ConfigurationError("SafetyController", "limits.dt", limits.dt, f"the controller's tick, dt = {dt} s")
+    return field
+
+
+def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:
+    """`evasion`, if it is one of this robot and this tick."""
+    if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
+        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {robot.nq} joints")
+    if evasion.dt != dt:
+        raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
+    return evasion
+
+
+def checked_barrier(barrier: DangerBarrier | None, field: Any) -> DangerBarrier | None:
+    """`barrier`, if it caps the controller's own field."""
+    if barrier is None:
+        return None
+    if not isinstance(barrier, DangerBarrier):
+        raise ConfigurationError("SafetyController", "barrier", barrier, "a DangerBarrier, e.g. DangerBarrier(10.5)")
+    if barrier.field is not field and barrier.field != field:
+        raise ConfigurationError(
+            "SafetyController", "barrier.field", barrier.field, f"the controller's own field, {field}"
+        )
+    return barrier
+
+
+def checked_recovery(rules: RecoveryRules) -> RecoveryRules:
+    """`rules`, if they are some."""
+    if not isinstance(rules, RecoveryRules):
+        raise ConfigurationError("SafetyController", "recovery", rules, "RecoveryRules")
+    return rules
 
 
 def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
@@ -109,6 +146,16 @@ def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> ND
     if not _all_below(qd, ABSURD_STEP / dt):  # without limits nothing else would stop it
         raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
     return qd
+
+
+def check_command(command: object, dt: float) -> None:
+    """Refuse what limits or a barrier of another making have made of the law's velocity, if no robot could be sent it.
+
+    Raises:
+        ValueError: It is not finite, or absurd.
+    """
+    if not (type(command) is np.ndarray and command.dtype is _FLOAT and _all_below(command, ABSURD_STEP / dt)):
+        raise ValueError(f"the limits or the barrier lead to a command that is not finite or absurd: {command}")
 
 
 @entry(types.boolean(readable(1), types.float64))

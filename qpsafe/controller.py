@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.checks import check_arguments, check_parts, checked_activation, checked_spots
+from qpsafe.checks import (
+    check_command,
+    check_tasks,
+    checked_activation,
+    checked_dt,
+    checked_field,
+    checked_law,
+    checked_recovery,
+    checked_robot,
+    checked_spots,
+)
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
+from qpsafe.errors import in_words
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits
+from qpsafe.parts import Parts
 from qpsafe.quick import Quick
 from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.reference import JointReference
@@ -28,7 +39,7 @@ from qpsafe.sense import sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.speed_cap import slowed
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
@@ -41,7 +52,7 @@ if TYPE_CHECKING:
 DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
 
 
-class SafetyController:
+class SafetyController(Parts):
     """Danger in, joint references out.
 
     Args:
@@ -52,7 +63,7 @@ class SafetyController:
         field: The danger field; the source's weights by default.
         activation: Thresholds of the tasks; the robot's for one or two tasks (the source's on the IRB 140).
         evasion: The admittance (16).
-        limits: Joint limits, by default the robot's; None switches them off (to compare laws, never on a robot).
+        limits: Joint limits, by default the robot's; "off" switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
@@ -74,7 +85,7 @@ class SafetyController:
         field: DangerField | None = None,
         activation: Activation | None = None,
         evasion: Evasion | None = None,
-        limits: JointLimits | str | None = "robot",
+        limits: JointLimits | str | None = None,
         spots: SpotArray | None = None,
         sensing: SensingRules | None = None,
         known: Sequence[Obstacle] = (),
@@ -82,51 +93,51 @@ class SafetyController:
         barrier: DangerBarrier | None = None,
         recovery: RecoveryRules | None = None,
     ) -> None:
-        check_arguments(robot, tasks, law, dt)
-        check_parts(robot, dt, field, activation, evasion, limits)
-        self.robot = robot
-        self.tasks = tuple(tasks)
-        self.law = HierarchicalLaw() if law is None else law
-        self.dt = float(dt)
-        self.field = DangerField() if field is None else field
-        self.activation = checked_activation(self.tasks, activation, robot)
-        self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
-        own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
-        self.limits = own if isinstance(limits, str) else limits
-        self._brake_limits = self.limits or own
-        self.spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
-        self.rules = SensingRules() if sensing is None else sensing
-        self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known, carried) if self.spots else None
+        self._robot = checked_robot("SafetyController", robot)
+        self._dt = checked_dt("SafetyController", dt)
+        check_tasks(robot, tasks, self._dt)
+        self._tasks = tuple(tasks)
+        self._law = HierarchicalLaw() if law is None else checked_law(law)
+        self._field = DangerField() if field is None else checked_field(field)
+        self._activation = checked_activation(self._tasks, activation, robot)
+        self.evasion = Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self._dt) if evasion is None else evasion
+        self.limits = limits
+        self._spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
+        self._rules = SensingRules() if sensing is None else sensing
+        check_surroundings(robot, self._rules, known, carried)
+        self._sensing: DistanceSensing | None = None
+        if self._spots is not None:
+            self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self.barrier = barrier
-        self.recovery_rules = RecoveryRules() if recovery is None else recovery
-        self._quick, self._gentle = Quick(robot), GentleLimits(self.recovery_rules.acceleration)
+        self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
+        self._quick, self._gentle = Quick(robot), GentleLimits(self._recovery_rules.acceleration)
         self.reset()
 
     def reset(self) -> None:
         """Start anew: the next valid measurement sets the commanded configuration."""
-        self.recovery = Recovery(self.tasks, self.activation.suspend_above, self.dt, self.recovery_rules)
-        self.evasion.reset()
-        if self.sensing is not None:
-            self.sensing.reset()
+        self._recovery = Recovery(self._tasks, self._activation.suspend_above, self._dt, self._recovery_rules)
+        self._evasion.reset()
+        if self._sensing is not None:
+            self._sensing.reset()
         self._seq = -1
         self._active = False
-        self._q = self.robot.home.copy()
-        self._qd = self._qd_before = np.zeros(self.robot.nq)
+        self._q = self._robot.home
+        self._qd = self._qd_before = np.zeros(self._robot.nq)
 
     def reseed(self) -> None:
         """Something else has moved or stopped the robot: the next valid measurement sets the commanded configuration.
 
         The path's clock stays, and the robot is led back to its path as after a suspension.
         """
-        self.evasion.reset()
-        self.recovery.set_tasks(self.tasks, self.activation.suspend_above, restart=False)
+        self._evasion.reset()
+        self._recovery.set_tasks(self._tasks, self._activation.suspend_above, restart=False)
         self._active = False
-        self._qd = self._qd_before = np.zeros(self.robot.nq)
+        self._qd = self._qd_before = np.zeros(self._robot.nq)
 
     def acknowledge(self) -> None:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
-        if self.sensing is not None:
-            self.sensing.acknowledge()
+        if self._sensing is not None:
+            self._sensing.acknowledge()
 
     def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
         """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
@@ -141,21 +152,20 @@ class SafetyController:
         Raises:
             ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
         """
-        check_arguments(self.robot, tasks, self.law, self.dt)
-        check_parts(self.robot, self.dt, None, activation, None, None)
-        if activation is None and len(tasks) == len(self.tasks):
-            activation = self.activation
-        activation = checked_activation(tuple(tasks), activation, self.robot)
-        self.tasks, self.activation = tuple(tasks), activation
-        self.recovery.set_tasks(self.tasks, activation.suspend_above, restart)
+        check_tasks(self._robot, tasks, self._dt)
+        if activation is None and len(tasks) == len(self._tasks):
+            activation = self._activation
+        activation = checked_activation(tuple(tasks), activation, self._robot)
+        self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
+        self._tasks, self._activation = tuple(tasks), activation
 
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
-        self.recovery.paused = True
+        self._recovery.paused = True
 
     def resume(self) -> None:
         """Let the path's clock run again."""
-        self.recovery.paused = False
+        self._recovery.paused = False
 
     def step(
         self,
@@ -180,21 +190,24 @@ class SafetyController:
             The tick, with the joint reference to send.
         """
         start = time.perf_counter()
-        self._seq += 1
-        clocks = self.recovery.clocks
+        clocks = self._recovery.clocks
         try:
-            tick = self._step(q, qd, distances, points, ages)
-        except BadInput as problem:
-            tick = self._brake(BAD_INPUT, str(problem))
-        except Exception as error:  # the loop must go on: report, brake, hold; the path waits for the robot
-            self.recovery.clocks = clocks
-            tick = self._brake(FAULT, f"{type(error).__name__}: {error}")
-        if self.sensing is not None:
-            tick.severity, tick.unseen = self.sensing.health.severity, self.sensing.unseen
+            tick = self._plan(q, qd, distances, points, ages)
+        except BaseException as error:
+            self._recovery.clocks = clocks  # the path waits for a robot that cannot go along
+            if isinstance(error, BadInput):
+                tick = self._brake(BAD_INPUT, in_words(error, kind=False))
+            elif isinstance(error, Exception):  # the loop must go on: report, brake, hold
+                tick = self._brake(FAULT, in_words(error))
+            else:  # somebody ends the program: nothing has moved
+                raise
+        if self._sensing is not None:
+            tick.severity, tick.unseen = self._sensing.health.severity, self._sensing.unseen
+        self._advance(tick.reference)
         tick.solve_time = time.perf_counter() - start
         return tick
 
-    def _step(
+    def _plan(
         self,
         q: ArrayLike,
         qd: ArrayLike,
@@ -202,100 +215,112 @@ class SafetyController:
         points: ArrayLike | None,
         ages: ArrayLike | None,
     ) -> Tick:
+        """All that may fail, and all that asks parts of the user's making; the command does not advance here."""
         if not self._active:  # the commanded configuration starts where the robot is
-            here, _ = as_joint_position(q, self.robot), as_joint_velocity(qd, self.robot)
+            here, _ = as_joint_position(q, self._robot), as_joint_velocity(qd, self._robot)
             self._q, self._active = np.array(here), True
             self._q.flags.writeable = False
-            self._qd = self._qd_before = np.zeros(self.robot.nq)
+            self._qd = self._qd_before = np.zeros(self._robot.nq)
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        parts = self.sensing, self.field, self.evasion
-        seen = None if self.barrier else self._quick.sensed(q, qd, distances, points, ages, *parts)
+        tasks, barrier, recovery = self._tasks, self._barrier, self._recovery
+        parts = self._sensing, self._field, self._evasion
+        seen = None if barrier is not None else self._quick.sensed(q, qd, distances, points, ages, *parts)
         if seen is None:
-            seen = sense(self.robot, q, qd, distances, points, ages, *parts)
+            seen = sense(self._robot, q, qd, distances, points, ages, *parts)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
-        switches, activations, regime = self.activation.at(cdf_n)
-        commanded = RobotState(self.robot, self._q)
-        samples = self.recovery.update(cdf_n, commanded, activations)
+        switches, activations, regime = self._activation.at(cdf_n)
+        commanded = RobotState(self._robot, self._q)
+        samples = recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits, qdd = self.limits, (self._qd - self._qd_before) / self.dt
-        if self.recovery.phase == RECOVERING and limits:
+        limits, qdd = self._limits, (self._qd - self._qd_before) / self._dt
+        if recovery.phase == RECOVERING and limits is not None:
             limits = self._gentle.choose(limits, self._q, self._qd, qdd)
-        resolver = None if self.barrier else self._quick.resolver(self.tasks, self.law, limits)
+        resolver = None if barrier is not None else self._quick.resolver(tasks, self._law, limits)
         resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
-            box = limits.box(self._q, self._qd, qdd) if limits else None
-            barrier = self.barrier and self.barrier.level(seen.measured, self._qd, seen.points, seen.danger)
-            soft = (barrier,) if barrier else ()
-            resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
-        command, usual = resolved.command, resolved.excess <= 1e-9 and resolved.solved
-        messages = () if usual else judged(resolved, self.robot.joint_names)
-        if self.barrier:  # exact, as far as the acceleration limits allow
-            command = self.barrier.scale(seen.measured, command, seen.points).factor * command
-            command = box.clip(command) if box else command
+            box = None if limits is None else limits.box(self._q, self._qd, qdd)
+            level = barrier and barrier.level(seen.measured, self._qd, seen.points, seen.danger)
+            soft = (level,) if level else ()
+            resolved = resolve(commanded, tasks, samples, qd0, activations, self._law, box, soft, self._dt)
+            command = resolved.command
+            if barrier is not None:  # exact, as far as the acceleration limits allow
+                command = barrier.scale(seen.measured, command, seen.points).factor * command
+                command = command if box is None else box.clip(command)
+            check_command(command, self._dt)  # whatever limits and barriers of another making do to it
+        else:
+            command = resolved.command
+        usual = resolved.excess <= 1e-9 and resolved.solved
+        messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
-            command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
-
-        # integrate -> joint reference, now that nothing of the user's can fail any more
-        path_time = self.recovery.path_time
-        off_path = None if self.recovery.on_path else partial(_errors, self.tasks, commanded, path_time)
+            command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         messages = (*messages, *seen.notes)
         return Tick(
-            reference=self._advance(command),
+            reference=self._reference(command),
             cdf_n=cdf_n,
             m=switches[0],
             f=switches[1] if len(switches) > 1 else 1.0,
             activations=activations,
             regime=regime,
-            phase=self.recovery.phase,
+            phase=recovery.phase,
             status=DEGRADED if messages else OK,
             messages=messages,
             qd0=qd0,
             points=seen.points,
             links=seen.links,
             vectors=seen.vectors,
-            path_time=path_time,
-            events=self.recovery.take_events(),
-            waits_for=self.recovery.waits_for,
-            joint_names=self.robot.joint_names,
+            path_time=recovery.path_time,
+            events=recovery.due_events(),
+            waits_for=recovery.waits_for,
+            joint_names=self._robot.joint_names,
             resolved=resolved,
-            off_path=off_path,
+            off_path=None if recovery.on_path else _errors(tasks, commanded, recovery.path_time),
         )
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
-        box = self._brake_limits.box(self._q, self._qd)
-        most = self._brake_limits.max_acceleration * self.dt
+        none = np.zeros(self._robot.nq)
+        box = self._braking.box(self._q, self._qd)
+        most = self._braking.max_acceleration * self._dt
         slower = self._qd - np.clip(self._qd, -most, most)  # inside the box, whose speeds can all be braked
-        qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # no danger is known: what was known fades
-        none = (0.0,) * len(self.tasks)
+        messages = (message,)
+        try:
+            qd0 = np.array(self._evasion.step(none))  # no danger is known: what was known fades
+        except Exception as error:  # an evasion of another making
+            qd0, messages = none, (message, in_words(error))
         return Tick(
-            reference=self._advance(slower),
+            reference=self._reference(slower),
             cdf_n=float("nan"),
             m=0.0,
             f=0.0,
-            activations=none,
+            activations=(0.0,) * len(self._tasks),
             regime="unknown",
-            phase=self.recovery.phase,
+            phase=self._recovery.phase,
             status=status,
-            messages=(message,),
+            messages=messages,
             qd0=qd0,
-            path_time=self.recovery.path_time,
-            joint_names=self.robot.joint_names,
+            path_time=self._recovery.path_time,
+            joint_names=self._robot.joint_names,
             resolved=Resolved(slower, 0.0, False, box, None, ()),
         )
 
-    def _advance(self, command: NDArray[np.float64]) -> JointReference:
-        """Integrate; the reference's arrays are nobody else's."""
-        self._qd_before, self._qd = self._qd, command.copy()
-        self._q = self._q + command * self.dt
+    def _reference(self, command: NDArray[np.float64]) -> JointReference:
+        """Where a command (n,) [rad/s] leads; its arrays are nobody else's."""
+        seq = self._seq + 1
+        return JointReference(seq, seq * self._dt, self._q + command * self._dt, command, self._active)
+
+    def _advance(self, reference: JointReference) -> None:
+        """Take the step of a tick: the one place that does, after all that could fail."""
+        self._seq = reference.seq
+        self._qd_before, self._qd = self._qd, reference.qd.copy()
+        self._q = reference.q.copy()
         self._q.flags.writeable = False  # tasks of any kind will see it
-        return JointReference(self._seq, self._seq * self.dt, self._q.copy(), command, self._active)
+        self._recovery.pass_events()
 
 
 def _errors(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
     """Errors against the tasks' own trajectories, not against the way back to them."""
-    return tuple(task.error(task.value(state), task.trajectory.sample(time)) for task in tasks)
+    return tuple([np.array(task.error(task.value(state), task.trajectory.sample(time))) for task in tasks])

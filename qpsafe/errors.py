@@ -7,9 +7,37 @@ and what was expected.
 
 from __future__ import annotations
 
+_LONGEST = 1000  # letters of a message in the loop
+
 
 class QpsafeError(Exception):
     """Base class of every error that qpsafe raises on purpose."""
+
+
+def in_words(error: BaseException, kind: bool = True) -> str:
+    """What an error says, with its kind; never raises, whatever a stranger's class does when it is asked.
+
+    Args:
+        error: The error.
+        kind: Whether to begin with the name of its class.
+    """
+    try:
+        words = f"{type(error).__name__}: {error}" if kind else f"{error}"
+    except Exception:
+        words = f"{_name_of(error)} that cannot say what it is about"
+    return words[:_LONGEST]
+
+
+def represented(value: object) -> str:
+    """`repr(value)`; never raises."""
+    try:
+        return f"{value!r}"
+    except Exception:
+        return f"<{_name_of(value)} that cannot be shown>"
+
+
+def _name_of(value: object) -> str:
+    return str(type.__dict__["__name__"].__get__(type(value)))  # not what a metaclass makes of it
 
 
 class ConfigurationError(QpsafeError, ValueError):
@@ -27,7 +55,7 @@ class ConfigurationError(QpsafeError, ValueError):
         self.key = key
         self.value = value
         self.expected = expected
-        super().__init__(f"{self.where}: {key} = {value!r}: expected {expected}")
+        super().__init__(f"{self.where}: {key} = {represented(value)}: expected {expected}")
 
 
 class RobotFileError(ConfigurationError):

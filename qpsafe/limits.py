@@ -8,7 +8,7 @@ it non-empty at the next tick, so a law that respects it never meets an infeasib
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import types
@@ -16,6 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
 
 #: Kinds of limits by their code; 0 stands for none.
 KINDS = ("", "position", "velocity", "acceleration", "jerk")
@@ -65,7 +69,7 @@ class Box(NamedTuple):
         return tuple(f"{names[i]}: {KINDS[kind]} limit sacrificed" for i, kind in enumerate(self.sacrificed) if kind)
 
 
-class JointLimits:
+class JointLimits(Fixed):
     """Position, velocity and acceleration limits of a velocity-controlled robot sampled at `dt`.
 
     Args:
@@ -79,8 +83,10 @@ class JointLimits:
             others comes first.
 
     Raises:
-        ConfigurationError: Shapes differ, a number is NaN, lower > upper, or a rate is not positive.
+        ConfigurationError: Shapes differ, a number is NaN, lower > upper, a rate is not positive, or one is changed.
     """
+
+    fixed = frozenset(("lower", "upper", "max_velocity", "max_acceleration", "dt", "return_speed", "max_jerk"))
 
     def __init__(
         self,
@@ -111,6 +117,15 @@ class JointLimits:
             if not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
 
+    @classmethod
+    def of(cls, robot: Robot, dt: float = 0.004) -> JointLimits:
+        """The robot's own limits, sampled at dt [s]."""
+        return cls(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, dt)
+
+    def plain(self) -> JointLimits:
+        """Limits of the same numbers, of no other making."""
+        return self if type(self) is JointLimits else JointLimits.gentler(self, 1.0)
+
     def gentler(self, share: float) -> JointLimits:
         """The same limits with a share of the acceleration."""
         acceleration = share * self.max_acceleration
@@ -135,6 +150,25 @@ class JointLimits:
         if self.max_jerk is not None:
             _limit_jerk(qd, np.zeros_like(qd) if qdd is None else qdd, self.max_jerk, self.dt, bounds, kinds)
         return Box(*bounds, *kinds)
+
+
+def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, dt: float) -> JointLimits | None:
+    """`limits`, if they fit the robot and the tick; the robot's own for None or "robot"; None for "off".
+
+    Raises:
+        ConfigurationError: They do not, in the name of `where`.
+    """
+    if limits is None or (isinstance(limits, str) and limits == "robot"):
+        return JointLimits.of(robot, dt)
+    if isinstance(limits, str) and limits == "off":
+        return None
+    if not isinstance(limits, JointLimits):
+        raise ConfigurationError(where, "limits", limits, 'a JointLimits, "robot" or "off"')
+    if limits.lower.shape != (robot.nq,):
+        raise ConfigurationError(where, "limits", f"limits of shape {limits.lower.shape}", f"({robot.nq},)")
+    if limits.dt != dt:
+        raise ConfigurationError(where, "limits.dt", limits.dt, f"the controller's tick, dt = {dt} s")
+    return limits
 
 
 def _numbers(key: str, value: ArrayLike, ndim: int = 1) -> NDArray[np.float64]:

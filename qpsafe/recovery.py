@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,8 +43,8 @@ class Recovery:
     def __init__(
         self, tasks: Sequence[Task], suspend_above: float, dt: float, rules: RecoveryRules | None = None
     ) -> None:
-        self.dt = dt
-        self.rules = RecoveryRules() if rules is None else rules
+        self._dt = dt
+        self._rules = RecoveryRules() if rules is None else rules
         self.phase = FOLLOWING
         self._kept = math.exp(-dt / self.rules.fade)  # of the speed of a held task, from tick to tick
         self.path_time = 0.0
@@ -53,6 +54,8 @@ class Recovery:
         self._rate = 1.0  # of the clock
         self._changed = False
         self._cursors: list[_Cursor] = []
+        self._passed: set[tuple[float, str]] = set()  # events at the very time where the clock stands
+        self._due: tuple[list[tuple[_Cursor, int]], set[tuple[float, str]]] | None = None  # found, not passed yet
         self.set_tasks(tasks, suspend_above, restart=True)
         self._changed = False
 
@@ -64,9 +67,15 @@ class Recovery:
             suspend_above: As for the class.
             restart: Whether the clock, and the events with it, starts from zero.
         """
+        time, passed = (0.0, set()) if restart else (self.path_time, self._passed)
         kept = {} if restart else {id(cursor.trajectory): cursor for cursor in self._cursors}
-        if restart:
-            self.path_time = 0.0
+        trajectories = {id(task.trajectory): task.trajectory for task in tasks}
+        cursors = [  # may fail, and nothing has changed then
+            kept.get(key) or _Cursor(trajectory, time, passed)
+            for key, trajectory in trajectories.items()
+            if hasattr(trajectory, "event")
+        ]
+        self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks = tuple(tasks)
         self.suspend_above = suspend_above
         self._returns: list[Return | None] = [None] * len(self.tasks)
@@ -74,22 +83,27 @@ class Recovery:
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
         self._last: list[Any] = [None] * len(self.tasks)  # state and reference of suspended tasks, last tick
         self._changed = True
-        trajectories = {id(task.trajectory): task.trajectory for task in self.tasks}
-        self._cursors = [
-            kept.get(key) or _Cursor(trajectory, self.path_time)
-            for key, trajectory in trajectories.items()
-            if hasattr(trajectory, "event")
-        ]
+
+    @property
+    def dt(self) -> float:
+        """Tick [s]."""
+        return self._dt
+
+    @property
+    def rules(self) -> RecoveryRules:
+        """How to return."""
+        return self._rules
 
     @property
     def clocks(self) -> tuple:
-        """Times on the path and on the returns; set them back when the robot could not go along."""
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending)
+        """Phase, times on the path and on the returns; set them back when the robot could not go along."""
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self.phase
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
         self.path_time, self._rate = clocks[:2]
-        self._returns, self._pending = list(clocks[2]), list(clocks[3])
+        self._returns, self._pending, self.phase = list(clocks[2]), list(clocks[3]), clocks[4]
+        self._due = None
 
     def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
         """Advance one tick and give each task its reference.
@@ -119,21 +133,32 @@ class Recovery:
         """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
         return self.phase == SUSPENDED or True not in self._pending
 
-    def take_events(self) -> tuple[str, ...]:
-        """Names of the events that the path has passed since they were last taken, each once, in their order."""
+    def due_events(self) -> tuple[str, ...]:
+        """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""
         if not self._cursors:
             return ()
-        found: list[tuple[float, str]] = []
+        found, due = [], []
         for cursor in self._cursors:
-            found.extend(cursor.take(self.path_time))
-        return tuple(name for _, name in sorted(found, key=lambda event: event[0]))
+            count, events = cursor.due_until(self.path_time)
+            found += events
+            due.append((cursor, count))
+        self._due = due, {event for event in (*self._passed, *found) if event[0] == self.path_time}
+        return tuple([name for _, name in sorted(found, key=itemgetter(0))])
+
+    def pass_events(self) -> None:
+        """The events that `due_events` has found have happened: each does so once."""
+        if self._due:
+            due, self._passed = self._due
+            for cursor, count in due:
+                cursor.count = count
+        self._due = None
 
     def _next_phase(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> None:
         self.waits_for = ()
         if self._changed:
-            self._changed = False
             if self.phase == FOLLOWING and self._not_met(state, (1.0,) * len(self.tasks)):
                 self._suspend()
+            self._changed = False
         if not cdf_n <= self.suspend_above and self.rules.enabled:
             self._suspend()
         elif self.phase == SUSPENDED:
@@ -217,20 +242,24 @@ class Recovery:
 class _Cursor:
     """Which event of a trajectory comes next; it only ever moves forward."""
 
-    def __init__(self, trajectory: Any, time: float) -> None:
+    def __init__(self, trajectory: Any, time: float, passed: set[tuple[float, str]]) -> None:
         self.trajectory = trajectory
         self.count = 0
-        while self.due(time, strictly=True):
-            self.count += 1
+        count, events = self.due_until(time)  # what is past when the trajectory is taken up will not happen
+        for k, event in enumerate(events):
+            if not (event[0] < time or event in passed):
+                count = k
+                break
+        self.count = count
 
-    def due(self, time: float, strictly: bool = False) -> bool:
+    def due(self, time: float) -> bool:
         event = self.trajectory.event(self.count)
-        return event is not None and (event.time < time if strictly else event.time <= time)
+        return event is not None and event.time <= time
 
-    def take(self, time: float) -> list[tuple[float, str]]:
-        found = []
-        while self.due(time):
-            event = self.trajectory.event(self.count)
-            found.append((event.time, event.name))
-            self.count += 1
-        return found
+    def due_until(self, time: float) -> tuple[int, list[tuple[float, str]]]:
+        """Number of the first event after `time`, and times and names of those before it that have not been passed."""
+        count, found = self.count, []
+        while (event := self.trajectory.event(count)) is not None and event.time <= time:
+            found.append((float(event.time), str(event.name)))
+            count += 1
+        return count, found

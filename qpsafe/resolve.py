@@ -93,7 +93,8 @@ def resolve(
     result = law.solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
     answer = checked_velocity(result, commanded.q, dt)
     command, excess = box.admit(answer) if box else (answer.copy(), 0.0)
-    return Resolved(command, excess, result.status == SOLVED, box, result, tuple([clik.error for clik in wanted]))
+    errors = tuple([np.array(clik.error) for clik in wanted])  # as they are now, whatever becomes of the task's arrays
+    return Resolved(command, excess, result.status == SOLVED, box, result, errors)
 
 
 def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,7 +52,7 @@ class Tick:
         unseen: Names of the spots that cannot be trusted now: nobody knows what is in front of them.
         joint_names: (n,) names used in reports.
         resolved: What tasks, limits and law came to; None if they were not asked.
-        off_path: Finds `errors` where the references of this tick were not the tasks' own trajectories.
+        off_path: The `errors` where the references of this tick were not the tasks' own trajectories.
     """
 
     reference: JointReference
@@ -77,13 +76,13 @@ class Tick:
     unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
     resolved: Resolved | None = field(default=None, repr=False)
-    off_path: Callable[[], tuple[NDArray[np.float64], ...]] | None = field(default=None, repr=False)
+    off_path: tuple[NDArray[np.float64], ...] | None = field(default=None, repr=False)
 
     @property
     def errors(self) -> tuple[NDArray[np.float64], ...]:
         """Task errors of the commanded pose against the tasks' own trajectories, per task (rows,)."""
         if self.off_path is not None:
-            return self.off_path()
+            return self.off_path
         return () if self.resolved is None else self.resolved.errors
 
     @property

@@ -60,7 +60,7 @@ class FixedLoop:
             tasks,
             experiment.law,
             activation=robot_activation(robot, len(self.targets), len(self.targets)),
-            limits="robot" if experiment.limits else None,
+            limits=None if experiment.limits else "off",
             sensing=experiment.rules,
             known=known_obstacles(scene),
             recovery=experiment.recovery,

@@ -63,14 +63,15 @@ class RelativeFrameTask(FrameTask):
         rows: As in `FrameTask`, in the axes of `base`.
     """
 
+    fixed = FrameTask.fixed | {"base"}
     name = "relative frame"
 
     def __init__(
         self, frame: str, base: str, trajectory: Trajectory, gain: float = 1.0, rows: Sequence[int] = ALL
     ) -> None:
+        self.frames = (frame, base)
         super().__init__(frame, trajectory, gain, rows)
         self.base = base
-        self.frames = (frame, base)
 
     def value(self, state: RobotState) -> NDArray[np.float64]:
         """Pose of the frame in the axes of `base` (4, 4) [m]."""

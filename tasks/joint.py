@@ -29,6 +29,7 @@ class JointTask(Task):
         ConfigurationError: Joints that are none, or a bad gain.
     """
 
+    fixed = Task.fixed | {"joints"}
     name = "joint"
 
     def __init__(self, trajectory: Trajectory, gain: float = 5.0, joints: Sequence[int] | None = None) -> None:
@@ -36,7 +37,7 @@ class JointTask(Task):
         good = joints is None or (len(joints) > 0 and len(set(joints)) == len(joints) and min(joints) >= 0)
         if not good:
             raise ConfigurationError(type(self).__name__, "joints", joints, "different numbers from 0, or None")
-        self.joints = None if joints is None else [int(joint) for joint in joints]
+        self.joints = None if joints is None else tuple(int(joint) for joint in joints)
 
     def value(self, state: RobotState) -> NDArray[np.float64]:
         """All joint positions (n,) [rad]."""
@@ -45,16 +46,16 @@ class JointTask(Task):
     def error(self, value: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
         """q_d - q of the chosen joints [rad]."""
         error = sample.position - value
-        return error if self.joints is None else error[self.joints]
+        return error if self.joints is None else error[list(self.joints)]
 
     def jacobian(self, state: RobotState) -> NDArray[np.float64]:
         """Rows of the identity."""
         identity = np.eye(len(state.q))
-        return identity if self.joints is None else identity[self.joints]
+        return identity if self.joints is None else identity[list(self.joints)]
 
     def velocity(self, error: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
         """q̇_d + K e of the chosen joints [rad/s]."""
-        velocity = sample.velocity if self.joints is None else sample.velocity[self.joints]
+        velocity = sample.velocity if self.joints is None else sample.velocity[list(self.joints)]
         return velocity + self.gain * error
 
     def misfit(self, robot: Robot) -> Misfit | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, log3
 from qpsafe.tasks.timing import Rates, TimeLaw
 from qpsafe.tasks.trajectory import JointSample, Sample, checked_pose, checked_vector
@@ -33,7 +34,7 @@ class Move(Protocol):
         ...
 
 
-class Line:
+class Line(Fixed):
     """Straight line, the orientation turning by the shortest way; one jerk-limited time law for both.
 
     Args:
@@ -44,6 +45,8 @@ class Line:
     Raises:
         ConfigurationError: A pose is none, or start and goal are the same.
     """
+
+    fixed = frozenset(("start", "goal", "law", "duration"))
 
     def __init__(self, start: ArrayLike, goal: ArrayLike, linear: Rates = LINEAR, angular: Rates = ANGULAR) -> None:
         name = type(self).__name__
@@ -91,6 +94,8 @@ class Arc(Line):
         ConfigurationError: The three points lie on a line, or as for `Line`.
     """
 
+    fixed = Line.fixed | {"centre", "radius"}
+
     def __init__(
         self,
         start: ArrayLike,
@@ -127,13 +132,15 @@ class Arc(Line):
         return self.centre + arm, self._angle * np.cross(self._axis, arm)
 
 
-class Dwell:
+class Dwell(Fixed):
     """Stay.
 
     Args:
         pose: (4, 4).
         duration: [s].
     """
+
+    fixed = frozenset(("pose", "duration"))
 
     def __init__(self, pose: ArrayLike, duration: float) -> None:
         if not (isinstance(duration, int | float) and 0.0 <= duration < math.inf):
@@ -145,7 +152,7 @@ class Dwell:
         return Sample(self.pose, np.zeros(6))
 
 
-class JointMove:
+class JointMove(Fixed):
     """Joints from any state to rest at a goal, all arriving together: a trajectory for a `JointTask`.
 
     Args:
@@ -153,6 +160,8 @@ class JointMove:
         speed, acceleration, jerk: Largest ones (n,) [rad/s ...].
         velocity, start_acceleration: At the start (n,); zero by default.
     """
+
+    fixed = frozenset(("law", "duration"))
 
     def __init__(
         self,
@@ -173,7 +182,7 @@ class JointMove:
         return JointSample(motion.position, motion.velocity)
 
 
-class JointMoveOfFrame:
+class JointMoveOfFrame(Fixed):
     """A joint move as the pose of a frame, so that position and orientation tasks can follow it.
 
     Args:
@@ -181,6 +190,8 @@ class JointMoveOfFrame:
         frame: Frame whose pose is given.
         move: Of the robot's joints.
     """
+
+    fixed = frozenset(("robot", "frame", "move", "duration"))
 
     def __init__(self, robot: Robot, frame: str, move: JointMove) -> None:
         self.robot, self.frame, self.move = robot, frame, move

@@ -36,6 +36,7 @@ class OrientationTask(PoseTask):
         ConfigurationError: Unknown form, or a bad gain.
     """
 
+    fixed = PoseTask.fixed | {"form"}
     rows = (3, 4, 5)
     name = "orientation"
 

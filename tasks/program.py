@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.tasks.moves import Move
 from qpsafe.tasks.trajectory import Sample
 
@@ -21,7 +22,7 @@ class Event(NamedTuple):
     name: str
 
 
-class Program:
+class Program(Fixed):
     """Moves in a row. It keeps no clock: the same time gives the same reference, so it can be paused anywhere.
 
     Args:
@@ -33,6 +34,8 @@ class Program:
     Raises:
         ConfigurationError: No moves, a gap between two of them, an event that belongs nowhere, a cycle not closed.
     """
+
+    fixed = frozenset(("moves", "cycle", "frame", "duration", "events"))
 
     def __init__(
         self, moves: Sequence[Move], events: Sequence[tuple[int, str]] = (), cycle: bool = False, frame: str = ""
@@ -63,8 +66,9 @@ class Program:
 
     def sample(self, t: float) -> Sample:
         """Reference at time t [s]; at rest at the last goal after the end, unless it is a cycle."""
-        if self._last is not None and self._last[0] == t:
-            return self._last[1]
+        last = self._last  # another thread may put another one there
+        if last is not None and last[0] == t:
+            return last[1]
         here = t % self.duration if self.cycle else t
         k = min(bisect_right(self._ends, here), len(self.moves) - 1)
         sample = self.moves[k].sample(here - (self._ends[k - 1] if k else 0.0))

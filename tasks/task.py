@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.tasks.clik import Clik, pose_clik
 from qpsafe.tasks.trajectory import Sample, Trajectory
 
@@ -26,7 +27,7 @@ class Misfit(NamedTuple):
     expected: str
 
 
-class Task(ABC):
+class Task(Fixed, ABC):
     """Something the robot is asked to do, at one priority.
 
     A task controls a value x(q): a pose or joint positions. Its error e(x, x_d) and its Jacobian J belong together:
@@ -41,6 +42,7 @@ class Task(ABC):
         ConfigurationError: The gain is not a positive finite number, or the trajectory is none.
     """
 
+    fixed = frozenset(("trajectory", "gain"))
     #: Name shown in reports.
     name: str
     #: Frames the value is made of.
@@ -107,10 +109,13 @@ class PoseTask(Task):
     #: Rows of the geometric Jacobian that the task uses, linear before angular.
     rows: tuple[int, ...]
 
+    fixed = Task.fixed | {"frame", "frames", "rows"}
+
     def __init__(self, frame: str, trajectory: Trajectory, gain: float) -> None:
         super().__init__(trajectory, gain)
         self.frame = frame
-        self.frames = (frame,)
+        self.__dict__.setdefault("frames", (frame,))
+        self.__dict__.setdefault("rows", tuple(self.rows))
         first, last = self.rows[0], self.rows[-1]
         self._numbers = np.array(self.rows, dtype=np.int64)
         contiguous = self.rows == tuple(range(first, last + 1))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.tasks.trajectory import checked_vector
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Rates:
         )
 
 
-class TimeLaw:
+class TimeLaw(Fixed):
     """The quickest motion from a state to rest at a goal, all coordinates arriving together.
 
     Args:
@@ -73,6 +74,8 @@ class TimeLaw:
     Raises:
         ConfigurationError: Something is not finite, or a rate is not positive.
     """
+
+    fixed = frozenset(("start", "goal", "duration"))
 
     def __init__(
         self,

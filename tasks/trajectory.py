@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, exp3_jacobian, is_rotation, log3
 
 
@@ -86,7 +87,7 @@ class Trajectory(Protocol):
         ...
 
 
-class FixedPose:
+class FixedPose(Fixed):
     """A reference that does not move, as in the source's first experiment.
 
     Args:
@@ -95,6 +96,8 @@ class FixedPose:
     Raises:
         ConfigurationError: `pose` is not a homogeneous matrix with a proper rotation.
     """
+
+    fixed = frozenset(("pose",))
 
     def __init__(self, pose: ArrayLike) -> None:
         self.pose = checked_pose("FixedPose", "pose", pose)
@@ -106,7 +109,7 @@ class FixedPose:
         return self._sample
 
 
-class FixedJoints:
+class FixedJoints(Fixed):
     """Joint positions that do not move.
 
     Args:
@@ -115,6 +118,8 @@ class FixedJoints:
     Raises:
         ConfigurationError: They are not finite numbers.
     """
+
+    fixed = frozenset(("position",))
 
     def __init__(self, position: ArrayLike) -> None:
         self.position = checked_vector("FixedJoints", "position", position)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Switching(NamedTuple):
     regime: str
 
 
-class Activation:
+class Activation(Fixed):
     """Activations 1 >= a_1 >= ... >= a_N >= 0 of N tasks, highest priority first, from the danger CDF_n.
 
     Args:
@@ -87,6 +88,8 @@ class Activation:
         ConfigurationError: A task would begin its release before one of lower priority is released completely,
             Δ_f (1+ε_f) > Δ (1-ε): Table I's impossible situation m = 0, f = 1 must not come near.
     """
+
+    fixed = frozenset(("thresholds", "levels"))
 
     def __init__(self, thresholds: tuple[Threshold, ...] = (Threshold(11.5, 0.15), Threshold(7.5, 0.25))) -> None:
         self.thresholds = tuple(thresholds)

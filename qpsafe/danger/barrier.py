@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.kinetic import velocity_gradient
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
@@ -37,7 +38,7 @@ class Scaling(NamedTuple):
     unreachable: int
 
 
-class DangerBarrier:
+class DangerBarrier(Fixed):
     """Caps the danger field at the detected points.
 
     Args:
@@ -49,6 +50,8 @@ class DangerBarrier:
     Raises:
         ConfigurationError: A value is out of range.
     """
+
+    fixed = frozenset(("delta_max", "horizon", "points", "field"))
 
     def __init__(
         self, delta_max: float, horizon: float = 0.2, points: int = 3, field: DangerField | None = None

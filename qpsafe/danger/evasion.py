@@ -103,12 +103,30 @@ class Evasion:
 
         if not (np.isfinite(dt) and dt > 0.0):
             raise ConfigurationError("Evasion", "dt", dt, "a finite time > 0 [s]")
-        self.mass = _positive_definite(mass, n, "mass")
-        self.damping = _positive_definite(damping, n, "damping")
+        self._dt = float(dt)
+        self._mass = _positive_definite(mass, n, "mass")
+        self._damping = _positive_definite(damping, n, "damping")
         # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
-        self._A = expm(-np.linalg.solve(self.mass, self.damping) * dt)
-        self._B = np.linalg.solve(self.damping.T, (np.eye(n) - self._A).T).T
+        self._A = expm(-np.linalg.solve(self._mass, self._damping) * dt).copy()
+        self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T.copy()
+        for array in (self._mass, self._damping, self._A, self._B):
+            array.flags.writeable = False
         self.velocity = np.zeros(n)
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """M (n, n), read-only."""
+        return self._mass
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """D (n, n), read-only."""
+        return self._damping
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self._dt
 
     def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
         """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s]."""
@@ -119,7 +137,7 @@ class Evasion:
 
     @property
     def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A, B (n, n) of a step, q̇0 <- A q̇0 + B σ."""
+        """A, B (n, n) of a step, q̇0 <- A q̇0 + B σ; read-only."""
         return self._A, self._B
 
     def reset(self) -> None:
@@ -131,7 +149,7 @@ def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64
     """Scalar, diagonal or full matrix as a checked (n, n) symmetric positive definite array."""
     expected = f"a positive scalar, ({n},) positive diagonal or ({n}, {n}) symmetric positive definite matrix"
     try:
-        array = np.asarray(value, dtype=float)
+        array = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ConfigurationError("Evasion", key, value, expected) from None
     if array.ndim < 2 and array.shape in ((), (1,), (n,)):

@@ -27,10 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sensing.rules import SensingRules
 
 Array = NDArray[np.float64]
 
 DEFAULT_PORT = 6511
+#: A sender's clock may run ahead by this [s]; ages further below zero are passed on as they are, and are sick.
+CLOCK_ERROR = SensingRules.clock_error
 _HEAD = struct.Struct("<4sBBHIIQ")
 _MAGIC, _VERSION, _AGES = b"QPSD", 1, 1
 
@@ -156,8 +159,12 @@ class SensorInput:
         newest = self._newest
         if newest is None:
             return np.full(self.count, np.nan), np.full(self.count, np.inf)
-        ages = np.full(self.count, now - self._arrived)
-        return newest.values, ages if newest.ages is None else ages + newest.ages
+        silence = now - self._arrived
+        if newest.ages is None:
+            return newest.values, np.full(self.count, silence)
+        # silence adds to what was sent, but never makes an age possible that was not
+        sent = newest.ages
+        return newest.values, np.where(sent < -CLOCK_ERROR, sent, silence + np.maximum(sent, 0.0))
 
     def _take(self, data: bytes, sender: tuple[str, int], now: float) -> int:
         restarted = now - self._arrived > self.RESTART_AFTER

@@ -16,9 +16,8 @@ if TYPE_CHECKING:
 
 def session_limits(controller: SafetyController) -> JointLimits:
     """Limits for the session: the controller's own, or, if it has none, the robot's."""
-    robot = controller.robot
-    own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, controller.dt)
-    return controller.limits or own
+    own = controller.limits
+    return JointLimits.of(controller.robot, controller.dt) if isinstance(own, str) else own
 
 
 def warm_up(controller: SafetyController, blind: bool, ticks: int = 300) -> None:

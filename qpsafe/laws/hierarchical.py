@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.packing import Packed
 from qpsafe.hqp.solution import SOLVED, Solution
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 Projection = Literal["strict", "paper"]
 
 
-class HierarchicalLaw:
+class HierarchicalLaw(Fixed):
     """Lexicographic QPs, one per regime of Table I, blended by the activations.
 
     q̇ = Σ_k w_k q̇_k, with w = `regime_weights` and q̇_k the solution of the hierarchy that keeps tasks 1..k,
@@ -48,6 +49,8 @@ class HierarchicalLaw:
     Raises:
         ConfigurationError: Unknown projection, or a damping that is no finite number >= 0.
     """
+
+    fixed = frozenset(("projection", "solver", "damping"))
 
     def __init__(self, projection: Projection = "strict", solver: str | None = None, damping: float = 0.0) -> None:
         if projection not in get_args(Projection):

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
 
 
-class WeightedLaw:
+class WeightedLaw(Fixed):
     """One QP: minimise Σ_k a_k w_k ||J_k q̇ - ẋ_k||² + w_E ||q̇ - q̇0||² within the limits.
 
     For two tasks: w_H m ||J_H q̇ - ẋ_H||² + w_L m f ||J_L q̇ - ẋ_L||² + w_E ||q̇ - q̇0||². Priorities are soft: a lower
@@ -27,6 +28,8 @@ class WeightedLaw:
     Raises:
         ConfigurationError: The ratio is not a finite number > 1, a weight not a finite number > 0.
     """
+
+    fixed = frozenset(("ratio", "solver", "weights"))
 
     def __init__(self, ratio: float = 1e3, solver: str | None = None, weights: Sequence[float] | None = None) -> None:
         if not (math.isfinite(ratio) and ratio > 1.0):

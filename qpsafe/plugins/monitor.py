@@ -7,14 +7,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.checks import check_parts
+from qpsafe.checks import checked_dt, checked_evasion, checked_field, checked_robot
 from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
-from qpsafe.limits import Box, JointLimits
+from qpsafe.limits import Box, JointLimits, checked_limits
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
@@ -35,7 +35,7 @@ class DangerMonitor:
         field: The danger field; the source's weights by default.
         activation: Thresholds, the highest priority's first; the robot's two by default.
         evasion: The admittance (16).
-        limits: Joint limits, by default the robot's; None for none.
+        limits: Joint limits, by default the robot's; "off" for none.
         ramp: A task that danger released comes back within this time at the earliest, and is released within a tenth
             of it [s]; 0 for at once. Here no path waits for the robot, as in section IV-C.
         base: Where the robot stands in the world of the points, a pose (4, 4); at the origin by default.
@@ -64,23 +64,20 @@ class DangerMonitor:
         field: DangerField | None = None,
         activation: Activation | None = None,
         evasion: Evasion | None = None,
-        limits: JointLimits | str | None = "robot",
+        limits: JointLimits | str | None = None,
         ramp: float = 0.5,
         base: ArrayLike | None = None,
     ) -> None:
-        if not hasattr(robot, "wire_frames"):
-            raise ConfigurationError("DangerMonitor", "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
-        if not (isinstance(dt, int | float) and not isinstance(dt, bool) and math.isfinite(dt) and dt > 0.0):
-            raise ConfigurationError("DangerMonitor", "dt", dt, "a finite time > 0 [s]")
+        self.robot, self.dt = checked_robot("DangerMonitor", robot), checked_dt("DangerMonitor", dt)
         if not (math.isfinite(ramp) and ramp >= 0.0):
             raise ConfigurationError("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]")
-        check_parts(robot, dt, field, activation, evasion, limits)
-        self.robot, self.dt = robot, float(dt)
-        self.field = DangerField() if field is None else field
+        self.field = DangerField() if field is None else checked_field(field)
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
-        self.evasion = evasion or Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt)
-        own = JointLimits(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, self.dt)
-        self.limits = own if isinstance(limits, str) else limits
+        if not isinstance(self.activation, Activation):
+            raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
+        own = Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt) if evasion is None else evasion
+        self.evasion = checked_evasion(own, robot, self.dt)
+        self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
         self.ramp = float(ramp)
         self._base = None if base is None else checked_pose("DangerMonitor", "base", base)
         self.reset()

@@ -187,7 +187,7 @@ class BoxRows(OnRobot):
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("JointLimit", "danger", danger, "a DangerMonitor")
         if danger.limits is None:
-            raise ConfigurationError("JointLimit", "danger.limits", None, "a DangerMonitor with limits")
+            raise ConfigurationError("JointLimit", "danger.limits", "off", "a DangerMonitor with limits")
         self.danger, self.robot, self.prefix = danger, danger.robot, prefix
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array]:

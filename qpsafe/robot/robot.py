@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.spec import Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
@@ -18,8 +19,8 @@ from qpsafe.robot.wire import Wire
 _FLOAT = np.dtype(np.float64)
 
 
-class Robot:
-    """Kinematics and limits of one robot; SI units, world frame = the model's world.
+class Robot(Fixed):
+    """Kinematics and limits of one robot; SI units, world frame = the model's world. It does not change.
 
     Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick
     and ask the state.
@@ -76,6 +77,9 @@ class Robot:
         self.tool: Tool | None = spec.tools[0] if spec.tools else None
         self.tool_frames = tuple(tool.frame for tool in spec.tools) or _tips(spec.wire_frames)
         self.chains = spec.chains
+        for value in (value for part in (*spec.chains, *spec.regions, *spec.tools) for value in part):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
         self.dh = _read_only(spec.chains[0].table) if len(spec.chains) == 1 else None
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
@@ -88,6 +92,8 @@ class Robot:
         starts = np.array([place[start] for start, _ in spec.wire_frames], dtype=np.intp)
         stops = np.array([place[stop] for _, stop in spec.wire_frames], dtype=np.intp)
         self.wire_indices = (starts, stops)
+        for array in self.wire_indices:
+            array.flags.writeable = False
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
         self.memory = self.tree.memory
@@ -99,14 +105,17 @@ class Robot:
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
 
-    def with_spots(self, file: str | Path) -> Robot:
+    def with_spots(self, file: str | Path | None) -> Robot:
         """The same robot with the distance sensors of another file.
 
         Args:
-            file: A name in the robot's folder, or a path. Read, and checked, when its spots are loaded.
+            file: A name in the robot's folder, or a path. Read, and checked, when its spots are loaded. None for none.
         """
-        other, own = copy(self), self.folder / file
-        other.spots_path = own if own.is_file() else Path(file)
+        other = copy(self)
+        path = None if file is None else self.folder / file
+        if path is not None and not path.is_file():
+            path = Path(file)  # type: ignore[arg-type]
+        other.__dict__["spots_path"] = path
         return other
 
     def at(self, q: ArrayLike) -> RobotState:

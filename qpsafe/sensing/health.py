@@ -1,7 +1,9 @@
 """Which readings can be believed. The one place that decides what makes a spot sick, dead, or the robot stop.
 
 The table of reactions is in docs/sensing.md. A reading is sick if it is not a number, below zero, minus infinity (REP
-117: too near to measure), stale, or stuck. +inf, and anything beyond the range, is healthy: nothing is in sight.
+117: too near to measure), stale, stuck, or of an impossible age: from the future, or older by more than the time that
+has passed; the clock it was taken by is wrong, and cannot tell when the sensor falls silent. +inf, and anything beyond
+the range, is healthy: nothing is in sight.
 Non-finite values are found before any arithmetic is done with them; every comparison is written so that NaN fails it.
 """
 
@@ -13,9 +15,9 @@ from numpy.typing import NDArray
 from qpsafe.danger.compiled import Array, Vector, inline
 from qpsafe.sensing.rules import SensingRules
 
-HEALTHY, NOT_A_NUMBER, BELOW_ZERO, STALE, STUCK = range(5)
+HEALTHY, NOT_A_NUMBER, BELOW_ZERO, STALE, STUCK, IMPOSSIBLE_AGE = range(6)
 #: What is wrong, by code.
-WORDS = ("healthy", "not a number", "below zero", "stale", "stuck")
+WORDS = ("healthy", "not a number", "below zero", "stale", "stuck", "of an impossible age")
 
 #: Severity: all spots see; some are dead and the speed is capped; too many are dead and the robot stops.
 CLEAR, CAPPED, STOPPED = "clear", "capped", "stopped"
@@ -38,35 +40,45 @@ class SpotHealth:
     """
 
     def __init__(self, count: int, rules: SensingRules, dt: float) -> None:
-        self.stuck_ticks = max(rules.ticks(rules.stuck_after, dt), 3)
-        self.dead_ticks = max(rules.ticks(rules.dead_after, dt), 1)
-        self.most = int(np.floor(rules.dead_share * count + 1e-9))
+        self._stuck_ticks = max(rules.ticks(rules.stuck_after, dt), 3)
+        self._dead_ticks = max(rules.ticks(rules.dead_after, dt), 1)
+        self._most = int(np.floor(rules.dead_share * count + 1e-9))
         #: Columns: code of this tick, ticks without a usable reading up to now, ticks with the same reading.
         self.counts: NDArray[np.int64] = np.zeros((count, 3), dtype=np.int64)
         self.dead: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
-        #: Columns: the last reading, NaN for none, and the point it meant at first.
-        self.seen = np.empty((count, 4))
+        #: Columns: the last reading, NaN for none, the point it meant at first, the last reading's age, NaN for none.
+        self.seen = np.empty((count, 5))
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, what was acknowledged or not."""
         self.counts[:] = 0
         self.dead[:] = False
-        self.seen[:, 0], self.seen[:, 1:] = np.nan, 0.0
+        self.seen[:, (0, 4)], self.seen[:, 1:4] = np.nan, 0.0
         self.stopped = False
         self._dying = self._out = 0  # spots that are dead; that are unusable or dead in this tick
 
     def acknowledge(self) -> None:
         """Let spots that work again work, and the robot move if enough of them do."""
-        self.dead[:] = self.counts[:, 1] >= self.dead_ticks
+        self.dead[:] = self.counts[:, 1] >= self._dead_ticks
         self._dying = int(self.dead.sum())
-        self.stopped = self._dying > self.most
+        self.stopped = self._dying > self._most
         self._out = int((self.dead | (self.codes != HEALTHY)).sum())
 
     def take(self, dead: int, out: int) -> None:
         """Take how many spots are dead, and how many dead or unusable, in this tick; `judge` has seen every spot."""
         self._dying, self._out = dead, out
-        self.stopped |= dead > self.most
+        self.stopped |= dead > self._most
+
+    @property
+    def ticks(self) -> tuple[int, int]:
+        """After how many ticks a spot is stuck, and dead."""
+        return self._stuck_ticks, self._dead_ticks
+
+    @property
+    def most(self) -> int:
+        """How many spots may be unusable."""
+        return self._most
 
     @property
     def codes(self) -> NDArray[np.int64]:
@@ -81,7 +93,7 @@ class SpotHealth:
     @property
     def too_many(self) -> bool:
         """Whether too many spots are unusable or dead, now or since the last acknowledgement."""
-        return self.stopped or self._out > self.most
+        return self.stopped or self._out > self._most
 
     @property
     def out_of_order(self) -> NDArray[np.intp]:
@@ -96,7 +108,10 @@ def judge(
     age: float,
     origin: Vector,
     direction: Vector,
+    range_max: float,
+    dt: float,
     max_age: float,
+    clock_error: float,
     motion: float,
     stuck_ticks: int,
     dead_ticks: int,
@@ -111,10 +126,13 @@ def judge(
         code = BELOW_ZERO
     elif not age <= max_age:  # an age that is not a number is stale
         code = STALE
+    elif age < -clock_error or age > seen[i, 4] + dt + clock_error:  # false where there was none
+        code = IMPOSSIBLE_AGE
     else:
         code = HEALTHY
+    seen[i, 4] = age
     # stuck: the same bits tick after tick, while the point they mean is carried along by the robot
-    if 0.0 <= d < np.inf:
+    if 0.0 <= d <= range_max:
         last, moved = seen[i, 0], 0.0
         for j in range(3):
             point = origin[j] + d * direction[j]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from qpsafe.danger.compiled import Array, Vector, add, dot, inline, row
+from qpsafe.fixed import Fixed
 from qpsafe.sensing.rules import SensingRules
 
 
-class PointHold:
+class PointHold(Fixed):
     """The point of every spot that counts, seen now or held.
 
     A nearer reading, and one that goes away no faster than `jump` a tick, counts at once. A reading that jumps farther
@@ -22,6 +23,8 @@ class PointHold:
         rules: Hold time, speed, jump, d_min.
         dt: Tick [s].
     """
+
+    fixed = frozenset(("ticks", "step"))
 
     def __init__(self, count: int, rules: SensingRules, dt: float) -> None:
         self.ticks = rules.ticks(rules.hold_time, dt)

@@ -23,6 +23,8 @@ class SensingRules:
             walking speed of ISO 13855 [m/s].
         jump: A reading this much farther than the one before is another thing, not the same one going away [m].
         max_age: An older reading is stale [s].
+        clock_error: An age below minus this, or one that has grown by a tick and more than this since the last tick,
+            is impossible: the clock that it was taken by is wrong [s].
         stuck_after: A spot is stuck whose reading stays the same, to the last bit, for this long [s] ...
         stuck_motion: ... while the point it means moves this far with the robot [m].
         dead_after: A spot without a usable reading for this long is dead until acknowledged [s].
@@ -41,6 +43,7 @@ class SensingRules:
     approach_speed: float = 1.6
     jump: float = 0.05
     max_age: float = 0.04
+    clock_error: float = 0.01
     stuck_after: float = 0.1
     stuck_motion: float = 0.02
     dead_after: float = 0.02
@@ -51,7 +54,7 @@ class SensingRules:
     def __post_init__(self) -> None:
         for key in ("d_min", "tolerance", "approach_speed", "jump", "stuck_motion"):
             self._check(key, 0.0, math.inf, "a finite number >= 0")
-        for key in ("hold_time", "max_age", "stuck_after", "dead_after"):
+        for key in ("hold_time", "max_age", "clock_error", "stuck_after", "dead_after"):
             self._check(key, 0.0, 3600.0, "a time, 0 to 3600 s")
         self._check("dead_share", 0.0, 1.0, "a share, 0 to 1")
         self._check("speed_cap", math.ulp(0.0), math.inf, "a finite speed > 0 [m/s]")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
 from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
@@ -46,7 +47,32 @@ class Seen(NamedTuple):
     notes: tuple[str, ...]
 
 
-class DistanceSensing:
+def check_surroundings(
+    robot: Robot, rules: object, known: Sequence[Obstacle], carried: Mapping[str, Sequence[Obstacle]] | None
+) -> None:
+    """Refuse what a `SafetyController` cannot sense with, by name.
+
+    Raises:
+        ConfigurationError: Rules, an obstacle or a frame that is none.
+    """
+    if not isinstance(rules, SensingRules):
+        raise ConfigurationError("SafetyController", "sensing", rules, "SensingRules")
+    if not (carried is None or isinstance(carried, Mapping)):
+        expected = 'what each frame carries, e.g. {"tcp": [Obstacle.box(...)]}'
+        raise ConfigurationError("SafetyController", "carried", carried, expected)
+    frames = {} if carried is None else carried
+    for frame in frames:
+        if frame not in robot.frame_names:
+            raise ConfigurationError("SafetyController", "carried", frame, "one of " + ", ".join(robot.frame_names))
+    for key, things in (("known", known), *((f"carried[{frame!r}]", things) for frame, things in frames.items())):
+        if not isinstance(things, Sequence) or isinstance(things, str):
+            raise ConfigurationError("SafetyController", key, things, "a list of Obstacles")
+        for i, thing in enumerate(things):
+            if not isinstance(thing, Obstacle):
+                raise ConfigurationError("SafetyController", f"{key}[{i}]", thing, "an Obstacle, e.g. Obstacle.box")
+
+
+class DistanceSensing(Fixed):
     """Readings of all spots in, points that count out; one call a tick.
 
     Args:
@@ -72,11 +98,7 @@ class DistanceSensing:
         carried: Mapping[str, Sequence[Obstacle]] | None = None,
     ) -> None:
         self.rules = rules = SensingRules() if rules is None else rules
-        if not isinstance(rules, SensingRules):
-            raise ConfigurationError("SafetyController", "sensing", rules, "SensingRules")
-        for i, obstacle in enumerate(known):
-            if not isinstance(obstacle, Obstacle):
-                raise ConfigurationError("SafetyController", f"known[{i}]", obstacle, "an Obstacle, e.g. Obstacle.box")
+        check_surroundings(robot, rules, known, carried)
         spots.check(robot)
         self.spots = spots
         # body 0 is the world: known obstacles stand in it
@@ -93,8 +115,10 @@ class DistanceSensing:
         links = np.asarray(spots.links, dtype=np.int64)
         cone = np.tan(0.5 * spots.field_of_view)
         ranges = np.ascontiguousarray(np.column_stack((spots.range_max, cone)))
-        self.fresh = np.zeros(count)
+        self.fresh = np.zeros(count)  # ages of readings that come without
         self.tables = (bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
+        for table in self.tables:
+            table.flags.writeable = False
         self.memory = (
             self.health.counts, self.health.seen, self.health.dead,
             self._hold.held, self._hold.age, self._velocity.track,
@@ -106,8 +130,9 @@ class DistanceSensing:
         numbers = (
             dt, rules.d_min, rules.tolerance, rules.max_age, rules.stuck_motion,
             hold.step, rules.jump, filter_.alpha, filter_.beta, filter_.fastest,
+            rules.clock_error,
         )  # fmt: skip
-        return np.array(numbers), np.array((health.stuck_ticks, health.dead_ticks, hold.ticks, rules.velocities))
+        return np.array(numbers), np.array((*health.ticks, hold.ticks, rules.velocities))
 
     def reset(self) -> None:
         """Forget everything: held points, sick and dead spots."""

@@ -47,7 +47,7 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class SpotArray:
-    """The distributed distance sensor of section II-B.
+    """The distributed distance sensor of section II-B; its arrays are its own, and read-only.
 
     Attributes:
         names: (k,) names.
@@ -75,6 +75,10 @@ class SpotArray:
             if value.shape in ((), (1,)):
                 value = np.full(len(self.names), float(value.reshape(())))
             object.__setattr__(self, key, value)
+        for key in ("links", "positions", "directions", "range_min", "range_max", "field_of_view"):
+            own = np.array(getattr(self, key))
+            own.flags.writeable = False
+            object.__setattr__(self, key, own)
 
     def __len__(self) -> int:
         return len(self.names)

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from qpsafe.danger.compiled import Array, Vector, inline
+from qpsafe.fixed import Fixed
 
 
-class ApproachVelocity:
+class ApproachVelocity(Fixed):
     """Velocity of each spot's point along its ray.
 
     With z the point's place along the ray in the world (measured distance plus the spot's own motion along the ray), at
@@ -24,6 +25,8 @@ class ApproachVelocity:
         time_constant: Of the filter, dt/α [s].
         fastest: A larger speed is cut to this [m/s].
     """
+
+    fixed = frozenset(("alpha", "beta", "fastest"))
 
     def __init__(self, count: int, dt: float, time_constant: float = 0.04, fastest: float = 2.0) -> None:
         self.alpha = min(dt / time_constant, 1.0)

@@ -1,6 +1,7 @@
 """Distances over UDP: what is sent is read, junk and strangers change nothing."""
 
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.distances import Distances, SensorInput, SensorOutput, decode, encode
+from qpsafe.sensing.rules import SensingRules
 
 VALUES = st.integers(0, 30).flatmap(lambda k: arrays(np.float64, k))  # NaN and infinities too
 
@@ -103,3 +105,29 @@ def test_the_sequence_wraps_around(wire) -> None:
 def test_an_address_in_use_is_named(wire) -> None:
     with pytest.raises(ConfigurationError, match=str(wire[0].address[1])):
         SensorInput(3, port=wire[0].address[1])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.floats(-1e6, 1e6) | st.floats(-0.1, 0.1) | st.just(float("nan")), min_size=3, max_size=3),
+    st.floats(0.06, 30.0),
+)
+def test_no_age_that_a_sender_states_hides_its_silence(sent: list[float], silence: float) -> None:
+    """Silent for longer than readings may be old, nothing looks fresh: each age is too high, impossible, or none."""
+    rules = SensingRules()
+    reader = SensorInput(3, port=0)
+    writer = SensorOutput(*reader.address)
+    try:
+        writer.send(np.zeros(3), np.array(sent))
+        until = time.monotonic() + 5.0
+        while reader.counts.used == 0 and time.monotonic() < until:
+            reader.read(100.0)
+        _, now = reader.read(100.0)
+        assert reader.counts.used == 1
+        impossible = np.array(sent) < -rules.clock_error
+        assert ((now < -rules.clock_error) == impossible).all()  # passed on as they are
+        _, ages = reader.read(100.0 + silence)
+        assert not ((-rules.clock_error <= ages) & (ages <= rules.max_age)).any()
+    finally:
+        reader.close()
+        writer.close()

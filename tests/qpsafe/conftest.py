@@ -63,7 +63,7 @@ class Run:
         assert np.isfinite(q).all()
         assert np.isfinite(qd).all()
         assert (np.abs(q - last_q - qd * dt) <= 1e-12 + 1e-15 * np.abs(q)).all()
-        if self.controller.limits is None:
+        if self.controller.limits == "off":
             return
         assert (np.abs(qd) <= robot.max_velocity + TOLERANCE).all()
         assert (np.abs(qd - last_qd) <= robot.max_acceleration * dt + TOLERANCE).all()

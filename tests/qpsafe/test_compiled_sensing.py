@@ -27,7 +27,7 @@ class Plain:
         self.hulls = [(body, half_spaces(name, corners)) for body, name, corners in hulls]
         k = len(self.spots)
         self.last, self.same, self.anchor = [np.nan] * k, [0] * k, np.zeros((k, 3))
-        self.sick, self.dead = [0] * k, [False] * k
+        self.sick, self.dead, self.aged = [0] * k, [False] * k, [np.nan] * k
         self.seen, self.age, self.held = [np.inf] * k, [0] * k, np.zeros((k, 3))
 
     def known(self, p: np.ndarray, tolerance: float, poses: np.ndarray) -> bool:
@@ -43,8 +43,10 @@ class Plain:
         poses = state.body_poses()
         points = {}
         for i, d in enumerate(distances):
-            usable = d >= 0.0 and ages[i] <= rules.max_age
-            if 0.0 <= d < np.inf:
+            usable = d >= 0.0 and -rules.clock_error <= ages[i] <= rules.max_age
+            usable = usable and not ages[i] > self.aged[i] + DT + rules.clock_error
+            self.aged[i] = ages[i]
+            if 0.0 <= d <= self.spots.range_max[i]:
                 point = origins[i] + d * directions[i]
                 if d != self.last[i]:
                     self.anchor[i], self.same[i] = point, 0
@@ -95,7 +97,7 @@ def drifting(rng: np.random.Generator, ticks: int) -> np.ndarray:
     d = rng.uniform(0.1, 0.9, 20) + np.cumsum(rng.normal(0.0, 0.01, (ticks, 20)), axis=0)
     for _ in range(25):
         i, start, length = rng.integers(20), rng.integers(ticks), rng.integers(1, 50)
-        spoilt = rng.choice([np.nan, np.inf, -np.inf, -0.1, 1e300, 0.0, 0.55, 0.3])
+        spoilt = rng.choice([np.nan, np.inf, -np.inf, -0.1, 1e300, 1.5, 0.0, 0.55, 0.3])
         d[start : start + length, i] = spoilt
     return d
 
@@ -111,7 +113,8 @@ def test_every_tick_is_what_the_rules_say(irb140: Any, velocities: bool, seed: i
     for k, distances in enumerate(drifting(rng, 80)):
         state = irb140.at(q + 0.2 * np.sin(0.05 * k) * speed)
         wire = state.wire(speed)
-        ages = np.where(rng.random(20) < 0.02, rng.choice([1.0, np.nan, np.inf]), 0.0)
+        strange = rng.choice([1.0, np.nan, np.inf, -np.inf, -1.0, -0.011, -0.009, 0.013, 0.015, 0.03], 20)
+        ages = np.where(rng.random(20) < 0.05, strange, 0.0)
         seen, expected = sensing.update(state, wire, distances, ages), plain.update(state, wire, distances, ages)
         assert seen.links.tolist() == [int(sensing.spots.links[i]) for i in expected]
         assert np.abs(seen.points - np.array(list(expected.values())).reshape(-1, 3)).max(initial=0.0) < 1e-12

@@ -1,6 +1,5 @@
 """Bad data never raises: it is reported by name, the robot brakes within its limits, holds, and goes on afterwards."""
 
-import copy
 import re
 from fractions import Fraction
 from typing import Any
@@ -270,8 +269,7 @@ def test_one_sick_spot_is_named_and_does_not_stop_the_robot(run: Any, irb140: An
 
 
 def test_a_robot_without_spots_says_so(run: Any, irb140: Any) -> None:
-    bare = copy.copy(irb140)
-    bare.spots_path = None
+    bare = irb140.with_spots(None)
     tasks = run(FAST).tasks
     controller = qpsafe.SafetyController(bare, tasks)
     assert controller.spots is None

@@ -35,7 +35,7 @@ def ticks_of_every_status(run: Any) -> dict[str, qpsafe.Tick]:
         "bad_input": loop.feed(None, None),
         "fault": run(Push([np.nan] * N)).step(),
         "first, bad": run().feed(None, None),
-        "no limits": run(limits=None).step(near(loop)),
+        "no limits": run(limits="off").step(near(loop)),
         "one task": run(tasks=run().tasks[:1]).step(near(loop)),
         "nullspace": run(qpsafe.NullspaceLaw()).step(near(loop)),
         "weighted": run(qpsafe.WeightedLaw()).step(near(loop)),

@@ -91,7 +91,7 @@ def test_a_lost_point_counts_for_the_hold_time_and_no_longer(run: Any, series: l
 
     The robot stands still: the distance of a counted point from its spot is what counts as its reading.
     """
-    loop = run(qpsafe.NullspaceLaw(), limits=None, sensing=RULES(hold_time=ticks * 0.004))
+    loop = run(qpsafe.NullspaceLaw(), limits="off", sensing=RULES(hold_time=ticks * 0.004))
     q, rest = loop.robot.home, np.zeros(6)
     origins, directions = loop.controller.spots.rays(loop.robot.at(q))
     history: list[np.ndarray] = []

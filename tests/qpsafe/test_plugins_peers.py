@@ -138,7 +138,7 @@ def near(robot, q, gap):
 
 
 def watch(robot, q, points, qd=None):
-    danger = DangerMonitor(robot, DT, ramp=0.0, limits=None)
+    danger = DangerMonitor(robot, DT, ramp=0.0, limits="off")
     for _ in range(40):
         danger.update(q, np.zeros(6) if qd is None else qd, points)
     return danger
@@ -437,7 +437,7 @@ def test_mistakes_are_named(engine, robot):
         (lambda: DangerMonitor(robot, 0.0), "dt"),
         (lambda: DangerMonitor(robot, ramp=-1.0), "ramp"),
         (lambda: DangerMonitor(robot, base=np.eye(3)), "base"),
-        (lambda: plugin.JointLimit(DangerMonitor(robot, limits=None)), "limits"),
+        (lambda: plugin.JointLimit(DangerMonitor(robot, limits="off")), "limits"),
         (lambda: DangerMonitor(robot, evasion=qpsafe.Evasion(1.0, 1.0, 7)), "evasion"),
         (lambda: qpsafe.WeightedLaw(weights=(1.0, 0.0)), "weights"),
     ):

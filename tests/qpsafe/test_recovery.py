@@ -70,7 +70,8 @@ class World:
         for _ in range(ticks):
             a = ACTIVE.get(danger, (0.0, 0.0))
             self.samples = self.recovery.update(danger, State(self.pose), a)  # type: ignore[arg-type]
-            self.events.extend(self.recovery.take_events())
+            self.events.extend(self.recovery.due_events())
+            self.recovery.pass_events()
             self.pose = self.pose.copy()
             if follow and a[0]:
                 self.pose[:3, 3] = self.samples[0].pose[:3, 3]
