@@ -41,7 +41,7 @@ class Outlet:
         # each of these is written by one thread only: the first two here, the others by the thread
         self._given = self._needed = 0
         self._taken = self._told = 0
-        self._seen, self._since = 0, 0.0
+        self._waited, self._seen, self._since = False, 0, 0.0  # when it was last asked
         self._thread = threading.Thread(target=self._run, name=f"outlet of {name}", daemon=True)
         self._thread.start()
 
@@ -99,8 +99,10 @@ class Outlet:
             return f"{self.name}: {self.failure}"
         if self.lost:
             return f"{self.name}: too slow, {self.lost} pieces were lost"
-        if self._needed == self._told or self._seen != self._taken:
+        waits = self._needed != self._told
+        if not waits or not self._waited or self._seen != self._taken:
             self._seen, self._since = self._taken, now
+        self._waited = waits
         if now - self._since > self.due:
             return f"{self.name}: blocked for {self.due:g} s"
         return ""

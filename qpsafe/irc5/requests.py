@@ -8,17 +8,15 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-#: Signals that end or suspend a process by default and can be caught, but for crashes of the program itself.
-LEAVE = tuple(
-    found
-    for name in (
-        *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGBREAK", "SIGALRM", "SIGVTALRM", "SIGPROF"),
-        *("SIGUSR2", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT"),
-    )
-    if (found := getattr(signal, name, None)) is not None
-)
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGTTIN", "SIGBREAK", "SIGALRM", "SIGVTALRM", "SIGPROF")
+_RARE = ("SIGUSR2", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT")
+_REAL_TIME = range(signal.SIGRTMIN, signal.SIGRTMAX + 1) if hasattr(signal, "SIGRTMIN") else ()
 
-_WORDS = {"SIGINT": "Ctrl-C"}
+#: Signals that end or suspend a process by default and can be caught, but for crashes of the program itself.
+LEAVE: tuple[int, ...] = (
+    *(getattr(signal, name) for name in (*_NAMES, *_RARE) if hasattr(signal, name)),
+    *_REAL_TIME,
+)
 
 
 class Requests:
@@ -45,8 +43,7 @@ class Requests:
             if self.leave and not self.driving:
                 old = before[number]
                 (old if callable(old) else signal.default_int_handler)(number, frame)
-            name = signal.Signals(number).name
-            self.leave = self.leave or _WORDS.get(name, name)
+            self.leave = self.leave or _word(number)
 
         def acknowledge(number: int, frame: FrameType | None) -> None:
             self.acknowledge = True
@@ -65,3 +62,12 @@ class Requests:
         finally:
             for number, old in before.items():
                 signal.signal(number, signal.SIG_DFL if old is None else old)
+
+
+def _word(number: int) -> str:
+    if number == signal.SIGINT:
+        return "Ctrl-C"
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time one between the first and the last
+        return f"signal {number}"
