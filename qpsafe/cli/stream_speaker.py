@@ -89,4 +89,5 @@ def refused(counts: Mapping[str, int], last: str) -> str:
     if not found:
         return ""
     why = ", ".join(f"{name} {count}" for name, count in found.items())
-    return f"{sum(found.values())} datagrams refused ({why}); the last: {last}"
+    total = sum(found.values())
+    return f"{total} datagram{'s' * (total != 1)} refused ({why}); the last: {last}"
