@@ -8,6 +8,7 @@ This is no safety function: it runs on an ordinary computer, in Python. It order
 
 from __future__ import annotations
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable
@@ -80,6 +81,14 @@ TRANSITIONS: dict[tuple[State, Event], State] = {
 }
 
 
+#: So many causes are listed; of the others it is only said that there are some.
+MOST_CAUSES = 20
+_MORE = "further causes, not listed"
+
+#: Measured figures and addresses, which change from tick to tick; whole numbers are names, as in "spot 3".
+_FIGURE = re.compile(r"0x[0-9a-fA-F]+|[-+]?\d*\.\d+(?:[eE][-+]?\d+)?|[-+]?\d+\.?[eE][-+]?\d+")
+
+
 class Transition(NamedTuple):
     """One line of the log.
 
@@ -106,12 +115,13 @@ class Transition(NamedTuple):
 class Supervisor:
     """Where the stream stands, and why.
 
-    Nothing here raises in the loop: an event that does not fit the state is ignored, and the call returns False.
+    Nothing here raises in the loop: an event that does not fit the state is ignored, and the call returns False. A
+    cause that differs from a known one in measured figures only is that one.
 
     Args:
         clock: Tells the time [s].
         keep: How many transitions `log` keeps; the oldest are dropped, `count` goes on.
-        on_transition: Called with every transition, e.g. to print it.
+        on_transition: Called with every transition, e.g. to print it. What it raises is kept in `unheard`, no more.
 
     Attributes:
         state: Now.
@@ -119,6 +129,7 @@ class Supervisor:
         causes: Why the state is degraded or worse; each once, until acknowledged.
         log: The last transitions.
         count: How many there have been.
+        unheard: The last exception of `on_transition`, in words; empty without one.
     """
 
     def __init__(
@@ -133,6 +144,7 @@ class Supervisor:
         self.causes: tuple[str, ...] = ()
         self.log: deque[Transition] = deque(maxlen=keep)
         self.count = 0
+        self.unheard = ""
 
     @property
     def moving(self) -> bool:
@@ -180,12 +192,14 @@ class Supervisor:
         after = TRANSITIONS.get((before, event), before)
         graver = category is not None and (self.category is None or category < self.category)
         bad = event in (Event.DEGRADE, Event.STOP, Event.CUT)
-        news = bad and cause not in self.causes and before is not IDLE and len(self.causes) < 100
+        news = bad and not self._known(cause) and before is not IDLE
+        if news and after is before and not graver and len(self.causes) >= MOST_CAUSES:
+            cause, news = _MORE, _MORE not in self.causes
         if after is before and not graver and not (news and before.severity >= DEGRADED.severity):
             return False
         if event is Event.ACKNOWLEDGE:
             self.causes, self.category = (), None
-        elif bad and cause not in self.causes:
+        elif bad and not self._known(cause):
             self.causes = (*self.causes, cause)
         if graver:
             self.category = category
@@ -194,5 +208,11 @@ class Supervisor:
         transition = Transition(self._clock(), before, after, event, self.category, cause)
         self.log.append(transition)
         if self._on_transition is not None:
-            self._on_transition(transition)
+            try:
+                self._on_transition(transition)
+            except Exception as error:  # of the user's; the loop must go on
+                self.unheard = type(error).__name__
         return True
+
+    def _known(self, cause: str) -> bool:
+        return cause in self.causes or _FIGURE.sub("#", cause) in {_FIGURE.sub("#", known) for known in self.causes}

@@ -25,7 +25,7 @@ from qpsafe.sim.experiments import experiment_loop
 from qpsafe.sim.irc5_here import Here
 from qpsafe.sim.irc5_loop import Exchange, Irc5Loop
 from qpsafe.sim.irc5_motion import EgmSettings
-from qpsafe.sim.irc5_process import RobotRun, run_robot
+from qpsafe.sim.irc5_process import RobotRun, farewell, run_robot
 from qpsafe.sim.irc5_udp import UdpExchange
 from qpsafe.sim.pick_loop import PickLoop
 
@@ -174,7 +174,9 @@ def over_the_wire(
             run = Irc5Loop(experiment_loop(name, robot)[0], exchange, settings)
             over = partial(_over, run, cycles)
             seen = run_robot(run, exchange, duration, lockstep=lockstep, keep=True, over=over)
-    return _course(run, seen.q[: round(duration / run.irc5.dt)]), seen, stream.report
+            course = _course(run, seen.q[: round(duration / run.irc5.dt)])
+            farewell(run, exchange, lockstep)
+    return course, seen, stream.report
 
 
 class Agreement(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from qpsafe.sim.irc5_link import NO_FAULTS, WireFaults
 from qpsafe.sim.irc5_loop import Irc5Loop
-from qpsafe.sim.irc5_udp import UdpExchange
+from qpsafe.sim.irc5_udp import NoAnswerError, UdpExchange
 
 Array = NDArray[np.float64]
 
@@ -146,6 +147,17 @@ def run_robot(
             break
     found.counts, found.rejected = asdict(irc5.counts), exchange.rejected
     return found
+
+
+def farewell(run: Irc5Loop, exchange: UdpExchange, lockstep: bool = False, cycles: int = 25) -> None:
+    """Stop the RAPID program and say so for some cycles, so that the other end knows why nothing comes any more."""
+    run.irc5.program(False)
+    with suppress(NoAnswerError):
+        for _ in range(cycles):
+            if not lockstep:
+                time.sleep(run.irc5.dt)
+            run.step()
+            run.advance()
 
 
 def _sleep(deadline: float, dt: float, found: RobotRun) -> float:

@@ -68,13 +68,13 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
-    from qpsafe.irc5.run import Requests
+    from qpsafe.irc5.requests import Requests
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments import experiment_loop
     from qpsafe.sim.irc5_link import WireFaults
     from qpsafe.sim.irc5_loop import Irc5Loop
     from qpsafe.sim.irc5_motion import EgmSettings
-    from qpsafe.sim.irc5_process import happenings, run_robot
+    from qpsafe.sim.irc5_process import farewell, happenings, run_robot
     from qpsafe.sim.irc5_udp import UdpExchange
 
     settings = EgmSettings(
@@ -127,9 +127,10 @@ def irc5_sim(
             progress=status if sys.stderr.isatty() and not json else None,
             over=lambda: bool(requests.leave),
         )
+        parts = Counter(loop.whereabouts()) if hasattr(loop, "whereabouts") else None
+        farewell(run, exchange, lockstep)
     if log is not None:
         write_text(log, table(result, found.joint_names))
-    parts = Counter(loop.whereabouts()) if hasattr(loop, "whereabouts") else None
     if json:
         print_json(result.to_dict() | {"parts": parts})
     else:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stdout
 from enum import StrEnum
+from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import IO, TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from qpsafe.controller import SafetyController
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.realtime import Grant
+    from qpsafe.irc5.reference_log import ReferenceWriter
 
 
 class Experiment(StrEnum):
@@ -59,6 +62,9 @@ def stream(
         str, typer.Option(metavar="HOST:PORT", help="Where names of the program's events are sent; empty: nowhere.")
     ] = "127.0.0.1:6512",
     duration: Annotated[float | None, typer.Option(min=0.1, help="Leave after this time of streaming [s].")] = None,
+    patience: Annotated[
+        float, typer.Option(min=0.0, help="Leave when the robot has been silent for so long [s]; 0: never.")
+    ] = 15.0,
     ramp_in: Annotated[float, typer.Option(min=0.01, max=10.0, help="Blending in from the measured pose [s].")] = 0.5,
     ramp_out: Annotated[float, typer.Option(min=0.01, max=10.0, help="Shortest time of braking [s].")] = 0.2,
     acknowledge: Annotated[
@@ -78,28 +84,36 @@ def stream(
 
     No safety function: keep the robot's own stops and limits independent of this program. SIGUSR1 acknowledges a stop.
     """
-    screen = console(json)
     from qpsafe.irc5 import realtime
+    from qpsafe.irc5.outlet import Outlet
+    from qpsafe.irc5.requests import Requests
 
     grants = [realtime.one_thread()]
-    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.cli.stream_report import result_of, say, show, status_line
-    from qpsafe.irc5.distances import SensorInput
-    from qpsafe.irc5.event_output import EventOutput
-    from qpsafe.irc5.loop import LoopRules, StreamLoop
-    from qpsafe.irc5.reference_log import ReferenceWriter
-    from qpsafe.irc5.rules import SessionRules
-    from qpsafe.irc5.run import Requests, run_stream
-    from qpsafe.irc5.streamer import EgmStreamer
-    from qpsafe.irc5.warm_up import session_limits, warm_up
-    from qpsafe.irc5.watchdog import Watchdog
-    from qpsafe.supervisor import Supervisor
-
-    controller = _controller(robot, program, cell, experiment, make_law(law, projection))
-    blind = not sensors or controller.sensing is None
     with ExitStack() as stack:
         requests = stack.enter_context(Requests().heard())
-        writer = None if log is None else stack.enter_context(ReferenceWriter(log, controller.robot.nq))
+        spoken, written = Outlet.over(sys.stderr, "standard error"), Outlet.over(sys.stdout, "standard output")
+        stack.callback(spoken.close)
+        stack.callback(written.close)
+        screen = console(json)
+        screen.file = cast("IO[str]", spoken if json else written)
+        screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+        from qpsafe.cli.stream_report import result_of, show
+        from qpsafe.cli.stream_speaker import Speaker
+        from qpsafe.irc5.distances import SensorInput
+        from qpsafe.irc5.event_output import EventOutput
+        from qpsafe.irc5.loop import LoopRules, StreamLoop
+        from qpsafe.irc5.rules import SessionRules
+        from qpsafe.irc5.run import run_stream
+        from qpsafe.irc5.streamer import EgmStreamer
+        from qpsafe.irc5.warm_up import session_limits, warm_up
+        from qpsafe.irc5.watchdog import Watchdog
+        from qpsafe.supervisor import Supervisor
+
+        controller = _controller(robot, program, cell, experiment, make_law(law, projection))
+        blind = not sensors or controller.sensing is None
+        writer = None if log is None else _writer(log, controller.robot.nq)
+        if writer is not None:
+            stack.enter_context(writer)
         output = EventOutput(events) if events else None
         inlet: SensorInput | None = None
         if not blind:
@@ -111,36 +125,52 @@ def stream(
         streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names)
         stack.callback(streamer.close)
         warm_up(controller, blind)
+        dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None
         if requests.leave:
             raise typer.Exit(130)
-        dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None
-        grants += _grants(real_time, priority)
-        supervisor = Supervisor(on_transition=say)
+        grants += _grants(real_time, priority, [spoken.thread, written.thread])
+        speaker = Speaker(spoken, streamer, inlet, status=sys.stderr.isatty() and not json)
+        supervisor = Supervisor(on_transition=speaker.say)
         loop = StreamLoop(controller, streamer.session, supervisor, LoopRules(manual=acknowledge is Acknowledge.manual))
         _announce(screen, grants, streamer.address, inlet, blind)
 
-        def on_tick(tick: Any) -> None:
-            if writer is not None and tick is not None:
-                writer.write(tick.reference)
-
+        requests.driving = True
         run = run_stream(
             streamer,
             loop,
             sensors=inlet,
             watchdog=dog,
+            helpers=[spoken.trouble, written.trouble, *([] if writer is None else [writer.trouble])],
             duration=duration,
+            patience=patience or math.inf,
             requests=requests,
-            on_tick=None if writer is None else on_tick,
+            on_tick=None if writer is None else lambda tick: None if tick is None else writer.write(tick.reference),
             on_events=None if output is None else output.send,
-            on_second=(lambda run: status_line(run, loop)) if sys.stderr.isatty() and not json else None,
+            on_second=lambda run: speaker.second(run, loop),
         )
-        result = result_of(run, loop, streamer, inlet, dog, grants)
-    if json:
-        print_json(result)
-    else:
-        show(result, screen)
-    if not result["good"]:
-        raise typer.Exit(1)
+        if writer is not None:
+            writer.close()
+            run.troubles += [words for words in [writer.trouble(0.0)] if words and words not in run.troubles]
+        result = result_of(run, loop, streamer, inlet, dog, grants, writer)
+        if json:
+            with redirect_stdout(StringIO()) as text:
+                print_json(result)
+            written.write(text.getvalue())
+        else:
+            show(result, screen)
+        if not written.close():
+            spoken.write("qpsafe: the report could not be written as a whole\n")
+        if not (spoken.close() and written.close() and result["good"]):
+            raise typer.Exit(1)
+
+
+def _writer(path: Path, joints: int) -> ReferenceWriter:
+    from qpsafe.irc5.reference_log import ReferenceWriter
+
+    try:
+        return ReferenceWriter(path, joints, beside=True)
+    except OSError as error:
+        raise ConfigurationError("qpsafe stream", "--log", str(path), f"a file that can be written ({error})") from None
 
 
 def _controller(
@@ -173,10 +203,12 @@ def _controller(
     return SafetyController(found, [PositionTask(tool, goal), OrientationTask(tool, goal)], law, known=known)
 
 
-def _grants(real_time: bool, priority: int) -> list[Grant]:
+def _grants(real_time: bool, priority: int, threads: list[int]) -> list[Grant]:
     from qpsafe.irc5 import realtime
 
     asked = [realtime.fifo(priority), realtime.lock_memory()] if real_time else []
+    for thread in threads if real_time else []:  # else others could hold one up while the loop waits for it
+        realtime.fifo(priority, thread)
     return [*asked, realtime.freeze_garbage()]
 
 

@@ -1,10 +1,10 @@
-"""What `qpsafe stream` tells: transitions as they come, a status line, and the report at the end."""
+"""The report of `qpsafe stream` at its end, as JSON and for people."""
 
 from __future__ import annotations
 
-import sys
-import time
 from typing import TYPE_CHECKING, Any
+
+from qpsafe.cli.stream_speaker import PERIOD, refused
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -12,26 +12,10 @@ if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.loop import StreamLoop
     from qpsafe.irc5.realtime import Grant
+    from qpsafe.irc5.reference_log import ReferenceWriter
     from qpsafe.irc5.run import StreamRun
     from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.watchdog import Watchdog
-    from qpsafe.supervisor import Transition
-
-PERIOD = 0.004  # an answer that takes longer comes after the robot's next packet [s]
-
-
-def say(transition: Transition) -> None:
-    """One line for a transition, with the time of the day."""
-    text = str(transition)[13:].strip()
-    sys.stderr.write(f"\r{time.strftime('%H:%M:%S')}  {text}\n")
-    sys.stderr.flush()
-
-
-def status_line(run: StreamRun, loop: StreamLoop) -> None:
-    """Overwrite the status line."""
-    late = run.latency.above(PERIOD)
-    sys.stderr.write(f"\r{loop.supervisor.state:9s} {run.duration:8.0f} s  {run.latency.count} answers, {late} late ")
-    sys.stderr.flush()
 
 
 def result_of(
@@ -41,16 +25,17 @@ def result_of(
     inlet: SensorInput | None,
     dog: Watchdog | None,
     grants: list[Grant],
+    writer: ReferenceWriter | None,
 ) -> dict[str, Any]:
     """The report, as JSON shows it."""
     counts, supervisor = streamer.counts, loop.supervisor
     late = run.latency.above(PERIOD)
     lost = counts["missed"] + counts["superseded"]
-    asked = any("watchdog" in cause for cause in supervisor.causes)
-    good = run.at_rest and not run.failure and not asked
+    asked = dog is not None and dog.asked > 0.0
     return {
-        "good": good,
+        "good": run.good,
         "failure": run.failure,
+        "troubles": run.troubles,
         "at_rest": run.at_rest,
         "duration": run.duration,
         "packets": counts["accepted"] + counts["missed"],
@@ -68,7 +53,14 @@ def result_of(
         "longest_controller_tick": run.worst_tick,
         "memory": {"steady": run.started, "end": run.ended, "growth": run.ended - run.started if run.started else None},
         "datagrams": dict(sorted(counts.items())),
-        "sensors": None if inlet is None else vars(inlet.counts),
+        "last_refusal": streamer.session.inbox.refusal,
+        "refused": refused(counts, streamer.session.inbox.refusal),
+        "sensors": None if inlet is None else vars(inlet.counts) | {"last_refusal": inlet.refusal},
+        "events": {
+            "counts": dict(run.happened),
+            "last": [{"time": round(moment, 3), "name": name} for moment, name in run.events],
+        },
+        "log": None if writer is None else {"path": str(writer.path), "references": writer.count},
         "watchdog": None if dog is None else {"limit": dog.limit, "oldest_heartbeat": dog.worst, "asked": asked},
         "granted": {grant.name: grant.granted for grant in grants},
         "state": supervisor.state.value,
@@ -84,8 +76,12 @@ def show(result: dict[str, Any], screen: Console) -> None:
 
     response = result["response"]
     screen.print()
+    for words in result["troubles"]:
+        screen.print(words, style="red", markup=False, highlight=False)
     if not result["answered"]:
-        screen.print("the robot never spoke", style="yellow")
+        came = result["refused"]
+        words = f"the robot was never answered: {came}" if came else "the robot never spoke"
+        screen.print(words, style="yellow", markup=False, highlight=False)
         return
     table = Table(title=f"{result['duration']:.1f} s, {result['packets']} packets of the robot")
     for heading in ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"):
@@ -106,9 +102,9 @@ def show(result: dict[str, Any], screen: Console) -> None:
     if memory["growth"] is not None:
         grown = memory["growth"] / 1e6
         screen.print(f"memory: {memory['steady'] / 1e6:.1f} MB, grown by {grown:.3f} MB since", highlight=False)
+    for name, count in result["events"]["counts"].items():
+        screen.print(f"event {name}: {count}", markup=False, highlight=False)
     if result["failure"]:
-        screen.print(f"the loop failed: {result['failure']}", style="red")
-    if result["watchdog"] is not None and result["watchdog"]["asked"]:
-        screen.print("the watchdog asked for a stop", style="red")
+        screen.print(f"the loop failed: {result['failure']}", style="red", markup=False)
     if not result["at_rest"]:
         screen.print("the stream fell silent before the robot was at rest", style="red")

@@ -120,6 +120,7 @@ class SensorInput:
 
     def __init__(self, count: int, host: str = "127.0.0.1", port: int = DEFAULT_PORT, peer: str | None = None) -> None:
         self.count, self.counts = count, SensorCounts()
+        self.refusal = ""  # the last one in words
         self._host, self._port = peer, 0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -170,10 +171,12 @@ class SensorInput:
         restarted = now - self._arrived > self.RESTART_AFTER
         if self._host not in (None, sender[0]) or not (restarted or self._port == sender[1]):
             self.counts.strangers += 1
+            self.refusal = f"{sender[0]}:{sender[1]} is not the sender of the distances"
             return 0
         found = decode(data, self.count)
         if found is None:
             self.counts.rejected += 1
+            self.refusal = f"{len(data)} bytes that are no sampling of {self.count} spots"
             return 0
         if self._newest is not None and not restarted and not 0 < (found.seq - self._newest.seq) % 2**32 < 2**31:
             self.counts.stale += 1

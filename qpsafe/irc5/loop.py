@@ -136,7 +136,8 @@ class StreamLoop:
         """
         self._watch_robot(cycle)
         supervisor = self.supervisor
-        self._settled = self._settled + 1 if supervisor.state is State.STOPPED else 0
+        # a reference that still gives way to what holds the robot is not at rest
+        self._settled = self._settled + 1 if supervisor.state is State.STOPPED and self.session.at_rest else 0
         if not supervisor.moving or not cycle.moving:
             if supervisor.state is State.STOPPED:
                 self._observe(cycle, distances, ages)
@@ -187,7 +188,8 @@ class StreamLoop:
                 if self.rules.manual:
                     session.stop(cause)
         if session.causes and supervisor.moving:  # the session's own: the robot does not follow, or a reference jumped
-            supervisor.stop(StopCategory.CONTROLLED_AND_HELD, "; ".join(session.causes))
+            for cause in session.causes:
+                supervisor.stop(StopCategory.CONTROLLED_AND_HELD, cause)
         if supervisor.state is State.STOPPING and session.phase not in (Phase.STOPPING, Phase.WAITING):
             supervisor.standstill("the reference is at rest")
         robots = all(cause.startswith(ROBOT) for cause in (*supervisor.causes, *session.causes))

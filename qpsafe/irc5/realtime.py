@@ -40,12 +40,12 @@ def one_thread() -> Grant:
     return Grant("threads", True, "one thread for numerics")
 
 
-def fifo(priority: int) -> Grant:
-    """The real-time scheduler SCHED_FIFO, for this process."""
+def fifo(priority: int, thread: int = 0) -> Grant:
+    """The real-time scheduler SCHED_FIFO, for a thread by its number; 0: for the one that asks."""
     if not hasattr(os, "sched_setscheduler"):
         return Grant("fifo", False, f"SCHED_FIFO: not to be had on {sys.platform}; normal priority")
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, ValueError) as error:
         reason = f"SCHED_FIFO {priority}: not permitted ({error}); normal priority"
         return Grant("fifo", False, reason + "; needs CAP_SYS_NICE, or a line 'rtprio' in /etc/security/limits.conf")

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
 from qpsafe.errors import ConfigurationError, QpsafeError
+from qpsafe.irc5.outlet import Outlet
 from qpsafe.irc5.reference_formats import BinaryFormat, CsvFormat, ReferenceFormat
 from qpsafe.reference import JointReference
 
@@ -42,13 +44,18 @@ class ReferenceWriter:
     Args:
         path: Name of the log, ending in ``.csv`` or ``.qpref`` (binary). Its folder must exist.
         n: Number of joints.
+        beside: Let a thread of its own write, so that the caller never waits for the disk. Nothing raises OSError then
+            but the making of the file: a full disk is told by `trouble`, and leaves the ``.part`` file.
+
+    Attributes:
+        count: References taken so far.
 
     Raises:
         ConfigurationError: The ending is another one, or n is no positive number.
         OSError: The file cannot be made.
     """
 
-    def __init__(self, path: str | Path, n: int) -> None:
+    def __init__(self, path: str | Path, n: int, beside: bool = False) -> None:
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
         self.n = n
@@ -56,8 +63,10 @@ class ReferenceWriter:
         self._format = _format(self.path)
         if not (isinstance(n, int) and 0 < n < 256):
             raise ConfigurationError("reference log", "n", n, "a number of joints, 1 to 255")
-        self._file = self.part.open("wb")
-        self._file.write(self._format.header(n))
+        self._file = self.part.open("wb", buffering=0)
+        self._outlet = Outlet(self._file.write, "log", due=5.0) if beside else None
+        self._kept = bytearray(self._format.header(n))
+        self._hand_over()
 
     def write(self, reference: JointReference) -> None:
         """Append one reference, as a whole.
@@ -65,16 +74,42 @@ class ReferenceWriter:
         Raises:
             ValueError: It is not one of n joints.
         """
-        self._file.write(self._format.record(reference, self.n))
+        self._kept += self._format.record(reference, self.n)
         self.count += 1
         if self.count % FLUSH_EVERY == 0:
-            self._file.flush()
+            self._hand_over()
+
+    def trouble(self, now: float) -> str:
+        """Why references do not reach the disk, empty if they do; `now` is a monotonic clock [s]."""
+        return "" if self._outlet is None else self._outlet.trouble(now)
 
     def close(self) -> None:
-        """Finish the log and give it its name; nothing if that was done."""
-        if not self._file.closed:
-            self._file.close()
-            os.replace(self.part, self.path)
+        """Finish the log and give it its name, if all of it is there; nothing if that was done."""
+        if not self._file.closed and self._end():
+            try:
+                os.replace(self.part, self.path)
+            except OSError as error:
+                if self._outlet is None:
+                    raise
+                self._outlet.failure = str(error)
+
+    def _end(self) -> bool:
+        """Write what is left and close the file; whether all of it was written."""
+        try:
+            self._hand_over()
+            return self._outlet is None or self._outlet.close()
+        finally:
+            if self._outlet is None or not self._outlet.busy:  # closing a file that a disk holds up would wait for it
+                self._file.close()
+
+    def _hand_over(self) -> None:
+        kept, self._kept = bytes(self._kept), bytearray()
+        if self._outlet is not None:
+            self._outlet.write(kept)
+            return
+        left = memoryview(kept)
+        while left:
+            left = left[self._file.write(left) :]
 
     def __enter__(self) -> Self:
         return self
@@ -84,8 +119,9 @@ class ReferenceWriter:
     ) -> None:
         if kind is None:
             self.close()
-        else:  # what is there stays readable, under the name of a log that was not finished
-            self._file.close()
+        elif not self._file.closed:  # what is there stays readable, under the name of a log that was not finished
+            with suppress(OSError):
+                self._end()
 
 
 def write_references(path: str | Path, references: Iterable[JointReference]) -> None:

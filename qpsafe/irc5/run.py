@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import signal
+import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from types import FrameType
-from typing import Any
 
 from qpsafe.irc5.distances import SensorInput
 from qpsafe.irc5.latency import Latency
-from qpsafe.irc5.loop import StreamLoop
+from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.realtime import resident
+from qpsafe.irc5.requests import Requests
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.watchdog import Watchdog
 from qpsafe.supervisor import State, StopCategory
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]
+CHECK = 0.05  # time between two looks at the helpers [s]
 STEADY = 5.0  # memory is compared from this time of the stream on [s]
+
+#: A helper of the loop: says what is wrong with it at a time of the monotonic clock [s], or nothing.
+Helper = Callable[[float], str]
 
 
 @dataclass
@@ -33,8 +36,13 @@ class StreamRun:
         started: Memory in use in the steady state, `STEADY` after the first answer [byte].
         ended: Memory in use at the end [byte].
         worst_tick: Longest time that the controller took [s].
-        at_rest: Whether the reference was at rest when the stream fell silent.
+        answered: Whether the robot has been answered at all.
+        at_rest: Whether the last answer left the robot standing.
+        silent: How long the robot has been silent [s].
         failure: What failed in the loop itself, empty if nothing.
+        troubles: What was wrong with the loop's helpers, each once; empty if nothing.
+        happened: How often each event of the task program happened.
+        events: The last events, (time since the first answer [s], name).
     """
 
     latency: Latency = field(default_factory=Latency)
@@ -42,38 +50,18 @@ class StreamRun:
     started: int = 0
     ended: int = 0
     worst_tick: float = 0.0
+    answered: bool = False
     at_rest: bool = True
+    silent: float = 0.0
     failure: str = ""
+    troubles: list[str] = field(default_factory=list)
+    happened: Counter[str] = field(default_factory=Counter)
+    events: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=1000))
 
-
-class Requests:
-    """What signals ask of the loop: SIGINT and SIGTERM to leave, SIGUSR1 to acknowledge."""
-
-    def __init__(self) -> None:
-        self.leave = ""
-        self.acknowledge = False
-
-    @contextmanager
-    def heard(self) -> Iterator[Requests]:
-        """Listen to signals meanwhile; the second request to leave is the old handler's, at once."""
-        before: dict[signal.Signals, Any] = {}
-
-        def leave(number: int, frame: FrameType | None) -> None:
-            if self.leave and callable(old := before[signal.Signals(number)]):
-                old(number, frame)
-            self.leave = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
-
-        def acknowledge(number: int, frame: FrameType | None) -> None:
-            self.acknowledge = True
-
-        handlers = {signal.SIGINT: leave, signal.SIGTERM: leave, signal.SIGUSR1: acknowledge}
-        for number, handler in handlers.items():
-            before[number] = signal.signal(number, handler)
-        try:
-            yield self
-        finally:
-            for number, old in before.items():
-                signal.signal(number, old)
+    @property
+    def good(self) -> bool:
+        """Whether a robot was streamed to, nothing failed, and it was left standing."""
+        return self.answered and self.at_rest and not self.failure and not self.troubles
 
 
 def run_stream(
@@ -82,11 +70,14 @@ def run_stream(
     *,
     sensors: SensorInput | None = None,
     watchdog: Watchdog | None = None,
+    helpers: Sequence[Helper] = (),
     duration: float | None = None,
+    patience: float = math.inf,
     requests: Requests | None = None,
     on_tick: Callable[[Tick | None], None] | None = None,
     on_events: Callable[[list[str]], None] | None = None,
     on_second: Callable[[StreamRun], None] | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> StreamRun:
     """Answer the robot until asked to leave, then ramp out, and only then fall silent.
 
@@ -95,33 +86,61 @@ def run_stream(
         loop: What answers.
         sensors: Where distances come from; None for a robot without.
         watchdog: To be told that the loop runs, and to be asked what it thinks.
+        helpers: Other helpers; one that is in trouble ends the stream, with the robot braked first.
         duration: Leave this long after the first answer [s].
+        patience: Leave when a robot that was answered has been silent for so long [s].
         requests: What is asked from outside.
         on_tick: Called with the controller's tick after each answer.
         on_events: Called with names of events before the answer of their tick is sent.
-        on_second: Called about once a second, after an answer.
+        on_second: Called about once a second, whether the robot speaks or not.
+        clock: Tells the time [s].
     """
     run, requests = StreamRun(), Requests() if requests is None else requests
-    heard = first = last = time.monotonic()
-    began = False
+    watched = [*helpers] if watchdog is None else [watchdog.trouble, *helpers]
+    heard = first = second = clock()
+    check = -math.inf
+
+    def leave(cause: str) -> None:
+        loop.stop(StopCategory.CONTROLLED_THEN_SILENT, cause)
+
+    def trouble(cause: str) -> None:
+        if cause not in run.troubles:
+            run.troubles.append(cause)
+        leave(cause)
+
     try:
         while True:
             cycle = streamer.wait(WAIT)
-            now = time.monotonic()
+            now = clock()
             if watchdog is not None:
                 watchdog.beat()
                 if watchdog.asked > 0.0:
-                    loop.stop(StopCategory.CONTROLLED_THEN_SILENT, "watchdog: no heartbeat in time")
+                    trouble("watchdog: no heartbeat in time")
+            if now - check >= CHECK:
+                check = now
+                for helper in watched:
+                    if found := helper(now):
+                        trouble(found)
             if requests.leave:
-                loop.stop(StopCategory.CONTROLLED_THEN_SILENT, requests.leave)
-            if duration is not None and began and now - first >= duration:
-                loop.stop(StopCategory.CONTROLLED_THEN_SILENT, "the duration is over")
+                leave(requests.leave)
+            if duration is not None and run.answered and now - first >= duration:
+                leave("the duration is over")
             if requests.acknowledge:
                 requests.acknowledge = False
-                loop.acknowledge("operator (SIGUSR1)")
+                if not loop.leaving:  # that is not taken back
+                    loop.acknowledge("operator (SIGUSR1)")
+            run.silent = now - heard
+            if now - second >= 1.0:
+                second = now
+                if run.started == 0 and run.duration >= STEADY:
+                    run.started = resident()
+                if on_second is not None:
+                    on_second(run)
             if cycle is None:
-                loop.silent(now - heard)
-                if loop.leaving and (now - heard > loop.rules.silence or not began):  # nobody to ramp out for
+                loop.silent(run.silent)
+                if run.answered and run.silent >= patience:
+                    leave(f"{ROBOT}silent for {patience:g} s")
+                if loop.leaving and (run.silent > loop.rules.silence or not run.answered):  # nobody to ramp out for
                     break
                 continue
             heard = now
@@ -129,37 +148,37 @@ def run_stream(
             reference = loop.step(cycle, distances, ages)
             if loop.over:
                 break
-            if loop.events and on_events is not None:
-                on_events(loop.take_events())
+            if not run.answered:
+                run.answered, first = True, now
+            run.duration = now - first
+            if loop.events:
+                names = loop.take_events()
+                run.happened.update(names)
+                run.events.extend((run.duration, name) for name in names)
+                if on_events is not None:
+                    on_events(names)
             streamer.answer(reference)
             run.latency.record(streamer.response)
-            if not began:
-                began, first, last = True, now, now
-            run.duration = now - first
             if loop.tick is not None:
                 run.worst_tick = max(run.worst_tick, loop.tick.solve_time)
             if on_tick is not None:
                 on_tick(loop.tick)
-            if now - last >= 1.0:
-                last = now
-                if run.started == 0 and run.duration >= STEADY:
-                    run.started = resident()
-                if on_second is not None:
-                    on_second(run)
-    except Exception as error:  # the loop itself: nothing it would send can be trusted but a ramp out of the session
+    except (
+        BaseException
+    ) as error:  # the loop itself: nothing it would send can be trusted but a ramp out of the session
         run.failure = f"{type(error).__name__}: {error}"
-        loop.stop(StopCategory.CONTROLLED_THEN_SILENT, f"loop failed: {run.failure}")
-        run.at_rest = _last_resort(streamer, loop)
+        leave(f"loop failed: {run.failure}")
+        _last_resort(streamer, loop, watchdog)
+    run.at_rest = not run.answered or loop.session.at_rest
     run.ended = resident()
     if loop.supervisor.state is not State.STOPPED:
-        loop.supervisor.standstill("the stream has ended")
+        loop.supervisor.standstill("the stream has ended" if run.at_rest else "the stream has ended: nobody listens")
     return run
 
 
-def _last_resort(streamer: EgmStreamer, loop: StreamLoop) -> bool:
+def _last_resort(streamer: EgmStreamer, loop: StreamLoop, watchdog: Watchdog | None) -> None:
     """The session brakes by itself; if even that fails, silence (category 0)."""
     try:
-        return streamer.finish()
-    except Exception as error:
+        streamer.finish(meanwhile=(lambda: None) if watchdog is None else watchdog.beat)
+    except BaseException as error:
         loop.supervisor.stop(StopCategory.IMMEDIATE, f"session failed: {type(error).__name__}: {error}")
-        return False

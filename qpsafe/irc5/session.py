@@ -215,8 +215,8 @@ class EgmSession:
         self._recent[-1] = q
 
     def _check(self, deviation: Array) -> None:
-        if self.phase == Phase.STOPPED or (deviation <= self.rules.deviation).all():
-            return
+        if self._relax or self.phase == Phase.STOPPED or (deviation <= self.rules.deviation).all():
+            return  # whatever else falls behind while a robot that is held brakes has the same cause
         worst = int(np.argmax(deviation))
         self._relax = True  # once at rest, do not go on pushing against what holds the robot back
         self.stop(f"{self.names[worst]} is {deviation[worst]:.3g} rad from what it was sent")

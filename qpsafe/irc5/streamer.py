@@ -7,7 +7,7 @@ import socket
 import struct
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -135,11 +135,12 @@ class EgmStreamer:
         """A person has seen to the cause of the stop. Returns False before the robot is stopped."""
         return self.session.acknowledge()
 
-    def finish(self, patience: float = 0.2) -> bool:
+    def finish(self, patience: float = 0.2, meanwhile: Callable[[], None] = lambda: None) -> bool:
         """Answer until the robot is at rest: to fall silent before would leave it at its last speed.
 
         Args:
             patience: How long to wait for each of its packets [s].
+            meanwhile: Called before each answer, e.g. to tell a watchdog.
 
         Returns:
             Whether it was brought to rest; False if it did not speak any more.
@@ -148,6 +149,7 @@ class EgmStreamer:
         while not self.session.at_rest:
             if self.wait(patience) is None:
                 return False
+            meanwhile()
             self.answer(None)
         return True
 

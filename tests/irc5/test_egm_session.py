@@ -626,6 +626,23 @@ def test_an_acknowledgement_waits_until_the_robot_stands(wire: Wire) -> None:
     wire.check_steps(since - 1)
 
 
+@given(st.integers(0, N - 1), st.integers(0, 40), st.floats(0.0, 0.9))
+@settings(max_examples=6, deadline=None)
+def test_a_robot_that_is_held_is_one_cause_until_acknowledged(joint: int, later: int, share: float) -> None:
+    """Whatever else falls behind meanwhile, and however far."""
+    wire = Wire().run()
+    for k in range(500):
+        stuck = wire.q.copy()
+        wire.exchange()
+        moved = wire.q - stuck
+        moved[joint] *= share
+        wire.q = stuck + (moved if k < later else 0.0)
+        if wire.session.phase == Phase.STOPPED:
+            break
+    assert wire.session.phase == Phase.STOPPED
+    assert len(wire.session.causes) == 1
+
+
 def test_a_stop_after_an_acknowledgement_holds(wire: Wire) -> None:
     wire.run()
     wire.session.stop("one")

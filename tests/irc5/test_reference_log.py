@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import struct
+import time
 from pathlib import Path
 
 import numpy as np
@@ -214,3 +216,44 @@ def test_references_are_equal_by_their_numbers() -> None:
     kinds = [JointReference(0, 0.0, q, q, True, torque, g) for torque in (None, q) for g in (None, gains)]
     assert [[x == y for y in kinds] for x in kinds] == np.eye(4, dtype=bool).tolist()
     assert JointReference(0, 0.0, q, q) != "a reference"
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_beside_the_loop_the_log_is_the_same(ending: str, tmp_path: Path) -> None:
+    references = some(600)
+    for beside in (False, True):
+        with ReferenceWriter(tmp_path / f"{beside}{ending}", 6, beside=beside) as writer:
+            for each in references:
+                writer.write(each)
+                assert writer.trouble(0.004 * each.seq) == ""
+    assert (tmp_path / f"True{ending}").read_bytes() == (tmp_path / f"False{ending}").read_bytes()
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("room", [0, 100, 20000, 30001])
+def test_a_disk_that_fills_up_is_told_and_what_fits_is_read(ending: str, room: int, tmp_path: Path) -> None:
+    """Nothing raises in the loop; what was written keeps the name of a log that was not finished."""
+    path = tmp_path / f"run{ending}"
+    writer = ReferenceWriter(path, 6, beside=True)
+    outlet, left = writer._outlet, [room]
+    assert outlet is not None
+    while not outlet._told:  # the header is there
+        time.sleep(0.001)
+
+    def write(piece: memoryview) -> int:
+        if left[0] == 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        taken = min(len(piece), left[0])
+        left[0] -= taken
+        return writer._file.write(piece[:taken])
+
+    outlet._put = write
+    log = some(1000)
+    with writer:
+        for each in log:
+            writer.write(each)
+    assert "No space left" in writer.trouble(0.0)
+    assert not path.exists()
+    found = read_references(writer.part).references
+    assert found == log[: len(found)]
+    assert (len(found) > 50) == (room >= 20000)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import resource
 import signal
+import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +20,11 @@ from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
-from qpsafe.irc5.messages import decode_sensor
+from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.reference_log import read_references
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.experiments import experiment_loop
-from qpsafe.sim.irc5_compare import agreement, in_one_process, over_the_wire, stream_process
+from qpsafe.sim.irc5_compare import StreamProcess, agreement, in_one_process, over_the_wire, stream_process
 from qpsafe.sim.irc5_link import WireFaults
 from qpsafe.sim.irc5_loop import Irc5Loop
 from qpsafe.sim.irc5_motion import EgmSettings
@@ -102,12 +107,43 @@ def test_bad_wire_restart_and_motors_off_over_real_sockets() -> None:
     assert report["state"] == "stopped"
 
 
+def _signals(*numbers: int) -> Callable[[StreamProcess], None]:
+    def send(stream: StreamProcess) -> None:
+        for number in numbers:
+            stream.process.send_signal(number)
+            time.sleep(0.01)
+
+    return send
+
+
+def _kill_watchdog(stream: StreamProcess) -> None:
+    pid = stream.process.pid
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    assert len(children) == 1
+    os.kill(int(children[0]), signal.SIGKILL)
+
+
+def _fill_disk(stream: StreamProcess) -> None:
+    """No file of its may grow beyond what the log has by now."""
+    resource.prlimit(stream.process.pid, resource.RLIMIT_FSIZE, (30000, resource.RLIM_INFINITY))
+
+
+ENDS: dict[str, tuple[Callable[[StreamProcess], None], int, str]] = {
+    "Ctrl-C": (_signals(signal.SIGINT), 0, "Ctrl-C"),
+    "signals": (_signals(signal.SIGHUP, signal.SIGQUIT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP), 0, "SIGHUP"),
+    "watchdog": (_kill_watchdog, 1, "watchdog: its process has ended (killed by SIGKILL)"),
+    "log": (_fill_disk, 1, "log: [Errno 27] File too large"),
+}
+
+
 @pytest.mark.slow
-def test_ctrl_c_ramps_out_before_silence() -> None:
-    """The last answers before the stream falls silent are a pose at rest."""
+@pytest.mark.parametrize("end", ENDS)
+def test_whatever_ends_the_stream_the_last_answers_are_a_pose_at_rest(end: str, tmp_path: Path) -> None:
+    do, code, words = ENDS[end]
     robot = load_robot("irb140")
-    answers = []
-    with stream_process("--no-sensors", "--watchdog", "5", "--experiment", "path") as stream:
+    options = ["--no-sensors", "--watchdog", "5", "--experiment", "path", "--log", str(tmp_path / "run.qpref")]
+    answers: list[bytes] = []
+    with stream_process(*options) as stream:
         exchange = UdpExchange(robot.nq, stream.addresses["the robot"], lockstep=5.0)
         receive = exchange._wait
 
@@ -119,18 +155,77 @@ def test_ctrl_c_ramps_out_before_silence() -> None:
         exchange._wait = kept  # type: ignore[method-assign]
         run = Irc5Loop(experiment_loop("path", robot)[0], exchange, EgmSettings())
         _go(run, 400)
-        stream.process.send_signal(signal.SIGINT)
+        do(stream)
         exchange._lockstep = 0.5  # type: ignore[misc]
         with pytest.raises(NoAnswerError):
-            _go(run, 1000)
+            _go(run, 3000)
         exchange.close()
     found = [decode_sensor(data, 6) for data in answers]
-    assert max(np.abs(answer.qd_ref).max() for answer in found[350:400]) > 0.0
     assert (found[-1].qd_ref == 0.0).all()
     assert (found[-1].q_ref == found[-40].q_ref).all()  # the pose at rest was sent for a while
     changes = np.abs(np.diff([answer.qd_ref for answer in found], axis=0))
     assert (changes <= robot.max_acceleration * 0.004 * (1.0 + 1e-6)).all()
-    assert stream.process.returncode == 0
+    assert stream.process.returncode == code
+    assert stream.report["at_rest"] is True
+    assert stream.report["good"] is (code == 0)
+    assert stream.report["causes"][0] == words
+    assert code == 0 or stream.report["troubles"] == [words]
+    assert not any("Traceback" in line for line in stream.said)
+    ending = ".qpref.part" if end == "log" else ".qpref"
+    assert len(read_references(tmp_path / f"run{ending}").references) > 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["full disk", "full pipe", "closed pipe"])
+def test_a_stream_that_nobody_can_hear_brakes_and_says_so_by_its_exit_code(where: str) -> None:
+    """Its words do not hold up its answers; when something must be told and cannot be, the robot is braked."""
+    robot = load_robot("irb140")
+    back, there = os.pipe()
+    error = os.open("/dev/full", os.O_WRONLY) if where == "full disk" else there
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = probe.getsockname()
+    command = [*PROGRAM, "stream", "--json", "--no-sensors", "--experiment", "path", "--watchdog", "5"]
+    command += ["--port", str(address[1]), "--events", ""]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=error, text=True)
+    if where == "closed pipe":
+        os.close(back)
+    exchange = UdpExchange(robot.nq, address, lockstep=5.0, patience=120.0)
+    run = Irc5Loop(experiment_loop("path", robot)[0], exchange, EgmSettings())
+    if where == "full pipe":
+        _fill(there)
+    _until_answered(run, exchange)
+    with pytest.raises(NoAnswerError):
+        _go(run, 3000)
+    assert process.stdout is not None
+    report = json.loads(process.stdout.read())
+    assert process.wait(timeout=60.0) == 1
+    exchange.close()
+    assert report["at_rest"] is True
+    assert report["good"] is False
+    assert report["answered"] > 0
+    assert "standard error" in report["troubles"][0]
+    os.close(error)
+
+
+def _fill(pipe: int) -> None:
+    os.set_blocking(pipe, False)
+    for size in (4096, 1):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(pipe, b"x" * size)
+    os.set_blocking(pipe, True)
+
+
+def _until_answered(run: Irc5Loop, exchange: UdpExchange) -> None:
+    """Its words are nowhere to be read: try until it answers."""
+    exchange._patience = exchange._lockstep = 0.2  # type: ignore[misc]
+    end = time.monotonic() + 120.0
+    while time.monotonic() < end:
+        with contextlib.suppress(NoAnswerError):
+            _go(run, 1)
+            return
+    raise AssertionError("never answered")
 
 
 def _go(run: Irc5Loop, cycles: int) -> None:
@@ -159,9 +254,51 @@ def test_ctrl_c_without_a_robot_leaves_at_once() -> None:
     with stream_process("--watchdog", "0") as stream:
         started = time.monotonic()
     assert time.monotonic() - started < 60.0
-    assert stream.process.returncode == 0
+    assert stream.process.returncode == 1  # nobody was streamed to
     assert stream.report["answered"] == 0
-    assert stream.report["good"] is True
+    assert stream.report["good"] is False
+
+
+@pytest.mark.slow
+def test_a_robot_that_cannot_be_understood_is_counted_and_named_while_waiting_and_at_the_end() -> None:
+    udp = socket.AF_INET, socket.SOCK_DGRAM
+    with stream_process("--no-sensors", "--watchdog", "0") as stream, socket.socket(*udp) as robot:
+        for k in range(1000):
+            data = encode_robot(RobotPacket(k, 4 * k, np.zeros(5), clock=1.0 + 0.004 * k))
+            robot.sendto(data, stream.addresses["the robot"])
+            time.sleep(0.001)  # not more at once than a socket's buffer holds
+        end = time.monotonic() + 60.0
+        while not any("datagrams refused" in line for line in stream.said) and time.monotonic() < end:
+            time.sleep(0.05)
+    line = next(line for line in stream.said if "datagrams refused" in line)
+    assert "wrong_joint_count" in line
+    assert "feedBack.joints: 5 numbers, expected 6" in line
+    assert stream.process.returncode == 1
+    assert stream.report["answered"] == 0
+    assert stream.report["datagrams"]["wrong_joint_count"] > 500
+    assert "feedBack.joints: 5 numbers, expected 6" in stream.report["refused"]
+
+
+@pytest.mark.slow
+def test_the_stream_ends_when_the_simulated_robot_has_and_says_which_events_happened() -> None:
+    with stream_process(
+        "--no-sensors", "--watchdog", "5", "--experiment", "pick-and-place", "--patience", "1"
+    ) as stream:
+        command = [
+            *PROGRAM,
+            "irc5-sim",
+            "--experiment",
+            "pick-and-place",
+            "--port",
+            str(stream.addresses["the robot"][1]),
+        ]
+        command += ["--sensor-port", "0", "--event-port", "0", "--duration", "4", "--json"]
+        subprocess.run(command, capture_output=True, timeout=200, check=True)
+        assert stream.process.wait(timeout=60.0) in (0, 1)  # by itself
+    assert stream.report["at_rest"] is True
+    assert "RAPID stopped" in " ".join(stream.report["causes"])
+    assert stream.report["events"]["counts"] == {"grip": 1}
+    assert stream.report["events"]["last"][0]["name"] == "grip"
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,11 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from qpsafe.supervisor import TRANSITIONS, Event, State, StopCategory, Supervisor
+from qpsafe.supervisor import MOST_CAUSES, TRANSITIONS, Event, State, StopCategory, Supervisor
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "supervisor.md"
 CAUSES = st.sampled_from(["sensor 3", "robot: motors off", "watchdog", "no packet", "operator"])
@@ -146,6 +146,46 @@ def test_the_log_is_bounded_and_a_repeated_cause_is_logged_once() -> None:
     text = str(supervisor.log[-1])
     assert "degraded -> degraded" in text
     assert "cause" in text
+
+
+@given(
+    st.lists(st.floats(0.0, 1e6, allow_subnormal=False), min_size=2, max_size=60),
+    st.sampled_from(["joint_2 is {} rad from what it was sent", "law: <object at 0x{:x}> failed after {:.3f} s"]),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_cause_whose_figures_change_is_one_cause_and_one_line(figures: list[float], words: str) -> None:
+    supervisor = Supervisor()
+    supervisor.seed("ready")
+    for figure in figures:
+        text = words.format(repr(float(figure))) if "joint" in words else words.format(int(figure), figure)
+        supervisor.stop(StopCategory.CONTROLLED_AND_HELD, text)
+    assert len(supervisor.causes) == 1
+    assert supervisor.count == 2
+
+
+def test_names_with_numbers_are_causes_of_their_own_up_to_a_bound() -> None:
+    supervisor = Supervisor()
+    supervisor.seed("ready")
+    for k in range(5):
+        supervisor.degrade(f"spot {k} is dead, joint_{k} too")
+    assert len(supervisor.causes) == 5
+    for k in range(5000):
+        supervisor.degrade(f"spot {k} is dead")
+    assert len(supervisor.causes) == MOST_CAUSES + 1
+    assert "further causes" in supervisor.causes[-1]
+    assert supervisor.stop(StopCategory.IMMEDIATE, "and what stops it is listed all the same")
+    assert "listed all the same" in supervisor.causes[-1]
+
+
+def test_whatever_listening_raises_the_supervisor_goes_on() -> None:
+    def fail(transition: object) -> None:
+        raise OSError("no space left")
+
+    supervisor = Supervisor(on_transition=fail)
+    assert supervisor.seed("ready")
+    assert supervisor.stop(StopCategory.CONTROLLED_THEN_SILENT, "Ctrl-C")
+    assert supervisor.state is State.STOPPING
+    assert supervisor.unheard == "OSError"
 
 
 def test_a_wrong_category_is_refused() -> None:
