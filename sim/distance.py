@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from qpsafe.sim.scene import Scene
 
 Array = NDArray[np.float64]
+Ids = NDArray[np.integer]
 
 
 class Distance(NamedTuple):
@@ -47,8 +48,7 @@ def _board_distance(scene: Scene, data: Any, board: int) -> Distance:
     local = (centres - data.geom_xpos[board]) @ data.geom_xmat[board].reshape(3, 3)
     outside = np.maximum(np.abs(local) - scene.model.geom_size[board], 0.0)
     bounds = np.sqrt((outside * outside).sum(axis=1)) - scene.model.geom_rbound[scene.robot_geoms]
-    pairs = [(geom, board) for geom in scene.robot_geoms]
-    return _smallest(scene.model, data, pairs, bounds)
+    return _smallest(scene.model, data, scene.robot_geoms, np.array([board]), bounds[:, None])
 
 
 def person_distance(scene: Scene, data: Any) -> Distance:
@@ -60,18 +60,19 @@ def person_distance(scene: Scene, data: Any) -> Distance:
     along = np.clip((offsets * axes).sum(axis=2), -halves, halves)
     offsets -= along[:, :, None] * axes
     bounds = np.sqrt((offsets * offsets).sum(axis=2)) - radii - model.geom_rbound[robot][:, None]
-    pairs = [(r, p) for r in robot for p in person]
-    return _smallest(model, data, pairs, bounds.ravel())
+    return _smallest(model, data, robot, person, bounds)
 
 
-def _smallest(model: Any, data: Any, pairs: list[tuple[int, int]], bounds: Array) -> Distance:
-    """Smallest distance over pairs of geoms, given lower bounds of theirs."""
+def _smallest(model: Any, data: Any, robot: Ids, other: Ids, bounds: Array) -> Distance:
+    """Smallest distance over all pairs of k and m geoms, given lower bounds of theirs (k, m)."""
     best, points, segment = np.inf, np.full(6, np.nan), np.empty(6)
-    for i in np.argsort(bounds):
+    flat = bounds.ravel()
+    for i in np.argsort(flat):
         # once something overlaps, any pair whose bounds overlap may be the deepest
-        if bounds[i] > max(best, 0.0):
+        if flat[i] > max(best, 0.0):
             break
-        distance = mujoco.mj_geomDistance(model, data, *pairs[i], 100.0, segment)
+        pair = robot[i // len(other)], other[i % len(other)]
+        distance = mujoco.mj_geomDistance(model, data, *pair, 100.0, segment)
         if distance < best:
             best, points = distance, segment.copy()
     return Distance(float(best), points[:3], points[3:])

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sensing.spots import rays_in_world
 from qpsafe.sim.scene import PERSON, ROBOT_COLLISION, SCENERY, Scene
 
 if TYPE_CHECKING:
@@ -87,6 +88,7 @@ class SpotRays:
     def __init__(self, scene: Scene, spots: SpotArray) -> None:
         self._scene, self._spots = scene, spots
         self._bodies = np.array([_body(scene, frame) for frame in spots.frames], dtype=np.intp)
+        self._mounting = spots.mounting(scene.robot)  # never changes, and takes longer than all that follows from it
         self._slant = np.tan(0.5 * spots.field_of_view)
         angle = 2.0 * np.pi * np.arange(RING) / RING
         self._circle = np.stack((np.cos(angle), np.sin(angle)), axis=1)  # (RING, 2)
@@ -99,12 +101,15 @@ class SpotRays:
             state: The robot in the same configuration.
             reach: Farther surfaces are not seen, by default the spots' range [m].
         """
-        origins, axes = self._spots.rays(state)
+        origins, axes = rays_in_world(state.body_poses(), *self._mounting)
         limit = self._spots.range_max if reach is None else reach
-        across = np.where(np.abs(axes[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-        u = np.cross(axes, across)
-        u /= np.linalg.norm(u, axis=1, keepdims=True)
-        basis = np.stack((u, np.cross(axes, u)), axis=1)  # (k, 2, 3)
+        x, y, z = axes.T
+        zero = np.zeros(len(axes))
+        # u = a × e / |a × e| with e the x axis, or the y axis where a is near x; v = a × u. np.cross takes far longer
+        u = np.where(np.abs(axes[:, :1]) < 0.8, np.stack((zero, z, -y), axis=1), np.stack((-z, zero, x), axis=1))
+        u /= np.sqrt((u * u).sum(axis=1))[:, None]
+        v = np.stack((y * u[:, 2] - z * u[:, 1], z * u[:, 0] - x * u[:, 2], x * u[:, 1] - y * u[:, 0]), axis=1)
+        basis = np.stack((u, v), axis=1)  # (k, 2, 3)
         mantle = axes[:, None, :] + self._slant[:, None, None] * (self._circle @ basis)
         rays = np.concatenate((axes[:, None, :], mantle), axis=1)
         return cast(self._scene, data, origins, rays, limit, bodies=self._bodies).min(axis=1)
