@@ -18,6 +18,7 @@ from qpsafe.laws.problem import Law, LawResult
 from qpsafe.limits import JointLimits
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -77,7 +78,7 @@ def check_parts(
     if activation is not None and not isinstance(activation, Activation):
         raise ConfigurationError("SafetyController", "activation", activation, "an Activation")
     if evasion is not None and not (isinstance(evasion, Evasion) and evasion.velocity.shape == (n,)):
-        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {n} joints")
+        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {counted(n, 'joint')}")
     if limits is None or (isinstance(limits, str) and limits == "robot"):
         return
     if not isinstance(limits, JointLimits):

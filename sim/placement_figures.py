@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qpsafe.placement.statistics import clopper_pearson
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.placement.study import Study
@@ -62,8 +63,8 @@ def figure_9(result: Study, path: Path, title: str) -> None:
         axes[2].set_xlabel("number of spots")
         axes[2].set_xlim(0, len(curve.order))
         figure.suptitle(
-            f"{title}: {len(curve.order)} nodes. Thick: {independent.pairs} independent pairs with 95 % bands; "
-            "thin: optimised pairs",
+            f"{title}: {counted(len(curve.order), 'node')}. Thick: {independent.pairs} independent pairs with 95 % "
+            "bands; thin: optimised pairs",
             fontsize=9,
         )
         part = path.with_name("." + path.name + ".part.png")

@@ -6,6 +6,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
+from qpsafe.words import counted, growth
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -80,20 +82,19 @@ def result_of(
 
 def show(result: dict[str, Any], screen: Console) -> None:
     """Print the report."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
     response = result["response"]
     screen.print()
     if not result["answered"]:
         screen.print("the robot never spoke", style="yellow")
         return
-    table = Table(title=f"{result['duration']:.1f} s, {result['packets']} packets of the robot")
-    for heading in ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"):
-        table.add_column(heading, justify="right")
+    title = f"{result['duration']:.1f} s, {counted(result['packets'], 'packet')} of the robot"
+    sheet = Sheet(title, ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"), text=())
     share = 100.0 * result["missed"] / max(result["packets"], 1)
     times = (f"{1e3 * response[key]:.3f} ms" for key in ("p50", "p99", "p99.9", "maximum"))
-    table.add_row(str(result["answered_in_time"]), str(result["missed"]), f"{share:.3f} %", *times)
-    screen.print(table)
+    sheet.add_row(str(result["answered_in_time"]), str(result["missed"]), f"{share:.3f} %", *times)
+    screen.print(sheet)
     for name, count in result["missed_parts"].items():
         screen.print(f"  missed, {name}: {count}", highlight=False)
     clock = "arrival in the kernel" if result["stamped_by_kernel"] else "reading"
@@ -104,8 +105,7 @@ def show(result: dict[str, Any], screen: Console) -> None:
         screen.print(f"  {label:>16s} {count:9d} {bar}", highlight=False)
     memory = result["memory"]
     if memory["growth"] is not None:
-        grown = memory["growth"] / 1e6
-        screen.print(f"memory: {memory['steady'] / 1e6:.1f} MB, grown by {grown:.3f} MB since", highlight=False)
+        screen.print(f"memory: {memory['steady'] / 1e6:.1f} MB, {growth(memory['growth'])} since")
     if result["failure"]:
         screen.print(f"the loop failed: {result['failure']}", style="red")
     if result["watchdog"] is not None and result["watchdog"]["asked"]:

@@ -14,6 +14,7 @@ from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.spec import Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.words import counted
 
 _FLOAT = np.dtype(np.float64)
 
@@ -97,7 +98,8 @@ class Robot:
         }
 
     def __repr__(self) -> str:
-        return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
+        size = f"{counted(self.nq, 'joint')}, {counted(len(self.wire_frames), 'wire link')}"
+        return f"Robot({self.name!r}, {size}, {self.model_path.name})"
 
     def with_spots(self, file: str | Path) -> Robot:
         """The same robot with the distance sensors of another file.
