@@ -5,36 +5,49 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
+import typer
 import typer.main
 
 from qpsafe.cli import main
 from qpsafe.cli.outputs import try_file, try_folder
 from qpsafe.errors import ConfigurationError
 
+APP: Any = typer.main.get_command(main.app)
 #: Paths that are read; every other path of the command line must be one that is written.
 INPUTS = {"story", "program", "people", "cell", "file"}
 
 
-def path_parameters(command: Any = None, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any, Any]]:
-    """Words, command and parameter of every path of the command line that is not an input."""
-    command = typer.main.get_command(main.app) if command is None else command
-    for name, below in getattr(command, "commands", {}).items():
-        yield from path_parameters(below, (*words, name))
-    for parameter in command.params:
-        if parameter.type.name == "path" and parameter.name not in INPUTS:
-            yield words, command, parameter
+def path_parameters(app: typer.Typer = main.app, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Words and option of every path of the command line that is not an input."""
+    for group in app.registered_groups:
+        assert group.typer_instance is not None
+        yield from path_parameters(group.typer_instance, (*words, str(group.name)))
+    for command in app.registered_commands:
+        assert command.callback is not None
+        here = (*words, command.name or command.callback.__name__)
+        for name, kind in get_type_hints(command.callback).items():
+            if (kind is Path or Path in get_args(kind)) and name not in INPUTS:
+                (option,) = (parameter for parameter in found(here).params if parameter.name == name)
+                yield here, option
+
+
+def found(words: tuple[str, ...]) -> Any:
+    command = APP
+    for word in words:
+        command = command.commands[word]
+    return command
 
 
 OUTPUTS = list(path_parameters())
+IDS = [f"{words[-1]} {parameter.name}" for words, parameter in OUTPUTS]
 ENDINGS = (".json", ".toml", ".csv", ".png", ".mp4")
 
 
 def test_the_outputs_are_those_of_all_commands() -> None:
-    found = {(words[-1], parameter.name) for words, _, parameter in OUTPUTS}
-    assert found == {
+    assert {(words[-1], parameter.name) for words, parameter in OUTPUTS} == {
         *((demo, "out") for demo in ("fixed", "path", "fast-person", "pick-and-place", "place")),
         *(("calibrate", name) for name in ("out", "plot")),
         *(
@@ -68,20 +81,18 @@ def begun(**_: object) -> None:
     pytest.fail("the work has begun")
 
 
-def invoke(words: tuple[str, ...], command: Any, parameter: Any, path: Path) -> None:
+def invoke(words: tuple[str, ...], parameter: Any, path: Path) -> None:
     """Call the command with nothing but the path; arguments that it needs are there, its work is not."""
+    command = found(words)
     arguments = ["x" for other in command.params if other.param_type_name == "argument" and other.required]
-    main_command = typer.main.get_command(main.app)
-    found = main_command
-    for word in words:
-        found = found.commands[word]  # type: ignore[attr-defined]
-    found.callback = begun
-    main_command(args=[*words, *arguments, parameter.opts[0], str(path)], prog_name="qpsafe", standalone_mode=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "callback", begun)
+        APP(args=[*words, *arguments, parameter.opts[0], str(path)], prog_name="qpsafe", standalone_mode=False)
 
 
-@pytest.mark.parametrize(("words", "command", "parameter"), OUTPUTS, ids=[f"{w[-1]} {p.name}" for w, _, p in OUTPUTS])
+@pytest.mark.parametrize(("words", "parameter"), OUTPUTS, ids=IDS)
 def test_a_bad_output_path_is_named_before_the_work_starts(
-    words: tuple[str, ...], command: Any, parameter: Any, tmp_path: Path
+    words: tuple[str, ...], parameter: Any, tmp_path: Path
 ) -> None:
     bad = bad_paths(tmp_path)
     before = sorted(tmp_path.rglob("*"))
@@ -95,7 +106,7 @@ def test_a_bad_output_path_is_named_before_the_work_starts(
         wrong += [tmp_path / "nowhere" / f"new{ending}" for ending in ENDINGS]
     for path in wrong:
         with pytest.raises(ConfigurationError) as refused:
-            invoke(words, command, parameter, path)
+            invoke(words, parameter, path)
         assert str(refused.value).startswith(
             f"qpsafe {' '.join(words)}: {parameter.opts[0]} = {str(path)!r}: expected a f"
         )
@@ -103,21 +114,22 @@ def test_a_bad_output_path_is_named_before_the_work_starts(
     assert (tmp_path / "file").read_text() == "kept"
 
 
-@pytest.mark.parametrize(("words", "command", "parameter"), OUTPUTS, ids=[f"{w[-1]} {p.name}" for w, _, p in OUTPUTS])
+@pytest.mark.parametrize(("words", "parameter"), OUTPUTS, ids=IDS)
 def test_a_good_output_path_leads_to_the_work_and_leaves_no_trace(
-    words: tuple[str, ...], command: Any, parameter: Any, tmp_path: Path
+    words: tuple[str, ...], parameter: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "old.csv").write_text("kept")
-    reached = 0
+    reached, refused = 0, []
     names = ["new", "a/b/c", "."] if "older" in parameter.help else [f"new{ending}" for ending in ENDINGS] + ["old.csv"]
     for name in names:
         try:
-            invoke(words, command, parameter, tmp_path / name)
+            invoke(words, parameter, tmp_path / name)
         except pytest.fail.Exception:
             reached += 1
         except ConfigurationError as error:
-            assert "ends in" in str(error)
+            refused.append(str(error))
     assert reached
+    assert all("that ends in" in text for text in refused)
     assert [path.name for path in tmp_path.iterdir()] == ["old.csv"]
     assert (tmp_path / "old.csv").read_text() == "kept"
 
