@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, verdict
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,8 +115,8 @@ def _show(
         screen.print(
             f"whole runs of {loop.duration:g} s, limits off: joint trajectories within "
             f"{loop.trajectory_deviation:.1e} rad (tolerance 1e-06)\n"
-            f"limits on: {loop.different} of {loop.ticks} ticks ({share:.2f} %) differ from (22), in {loop.explained} "
-            f"of them a limit binds; median {loop.median:.1e}, worst {loop.worst:.2g} rad/s\n"
+            f"limits on: {loop.different} of {counted(loop.ticks, 'tick')} ({share:.2f} %) differ from (22), in "
+            f"{loop.explained} of them a limit binds; median {loop.median:.1e}, worst {loop.worst:.2g} rad/s\n"
             f"largest step of q̇ relative to a_max dt: {loop.largest_step:.3f} with limits, "
             f"{loop.largest_step_source:.3f} by (22) alone",
             highlight=False,

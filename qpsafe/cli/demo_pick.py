@@ -21,6 +21,7 @@ from qpsafe.cli.common import (
     write_text,
 )
 from qpsafe.cli.outputs import output_folder
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -164,8 +165,8 @@ def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check
     text = f"a cycle takes {cycle:.2f} s without people; with them it costs {costs['median']:.2f} s more"
     if len(runs) > 1:
         text += (
-            f" (median of {len(runs)} seeds; quartiles {costs['quartile_1']:.2f} and {costs['quartile_3']:.2f}, "
-            f"range {costs['smallest']:.2f} to {costs['largest']:.2f})"
+            f" (median of {counted(len(runs), 'seed')}; quartiles {costs['quartile_1']:.2f} and "
+            f"{costs['quartile_3']:.2f}, range {costs['smallest']:.2f} to {costs['largest']:.2f})"
         )
     screen.print(text)
     show_checks("What the runs should show", checks, screen)

@@ -195,8 +195,8 @@ def _remark(title: str, result: Study, command: str, pairs: int) -> str:
     goal = "fewest spots for a probability, eq. (13)" if answer.objective == "probability" else answer.objective
     return (
         f"{counted(len(answer.solution.chosen), 'spot')} on the {title}, made by `{command}`: chosen out of "
-        f"{counted(len(found), 'node')} {1e3 * found.spacing:.0f} mm apart for the objective: {goal} ({pairs} pairs, "
-        f"{answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
+        f"{counted(len(found), 'node')} {1e3 * found.spacing:.0f} mm apart for the objective: {goal} "
+        f"({counted(pairs, 'pair')}, {answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
         f"{100 * answer.fair.probability:.1f} % of an independent sample (95 %: {100 * answer.fair.low:.1f} to "
         f"{100 * answer.fair.high:.1f}). position [m] and direction (unit) are given in the frame of the link that "
         "carries the spot, eq. (7); link counts wire links from 1: the spot's danger vector acts there, eq. (8)."
@@ -209,7 +209,7 @@ def show(result: Study, screen: Console) -> None:
 
     pairs = result.samples[1].pairs
     headings = ("objective", "spots", "detected", "95 %", "optimised", "danger", "method", "gap")
-    sheet = Sheet(f"Judged on {pairs} independent pairs, but for `optimised`", headings, text=(0, 6))
+    sheet = Sheet(f"Judged on {counted(pairs, 'independent pair')}, but for `optimised`", headings, text=(0, 6))
     for name, item in result.placements.items():
         fair, solution = item.fair, item.solution
         sheet.add_row(
