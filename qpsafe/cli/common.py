@@ -101,7 +101,7 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
 
     columns = (  # where room is short, the bar gives way and a long description is wrapped: nothing is cut
         TextColumn("{task.description}", markup=False, table_column=Column()),
-        BarColumn(),
+        BarColumn(bar_width=20),
         MofNCompleteColumn(table_column=Column(no_wrap=True)),
         TimeElapsedColumn(table_column=Column(no_wrap=True)),
         TimeRemainingColumn(table_column=Column(no_wrap=True)),

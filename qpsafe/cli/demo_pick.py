@@ -146,12 +146,12 @@ def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check
     from qpsafe.cli.sheet import Sheet
     from qpsafe.sim.pick_report import cost, spread
 
-    headings = ("seed", "delivered", "missed", "lost", "taken", "placed", "all cycles, s", "cost, s/cycle")
-    sheet = Sheet("Third experiment: screws", headings)
+    counts = ("delivered", "missed", "lost", "taken", "placed")
+    sheet = Sheet("Third experiment: screws", ("seed", *counts, "all cycles, s", "cost, s/cycle"))
     for item in (alone, *runs):
-        counts = (item.delivered, item.missed, item.lost, item.taken, item.placed)
+        numbers = (item.delivered, item.missed, item.lost, item.taken, item.placed)
         extra = "-" if item is alone else f"{cost(item, alone):.2f}"
-        sheet.add_row(_seed(item, alone), *map(str, counts), f"{item.duration:.1f}", extra)
+        sheet.add_row(_seed(item, alone), *map(str, numbers), f"{item.duration:.1f}", extra)
     screen.print(sheet)
     headings = ("seed", "nearest, m", "moving, m", "contacts", "tables, mm", "suspended", "largest CDF_n")
     sheet = Sheet("Third experiment: safety", headings)

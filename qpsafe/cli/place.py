@@ -82,7 +82,7 @@ def place(
 
         def tried(grids: int, last: int) -> None:
             progress.update(
-                task, completed=grids, description=f"{counted(nodes, 'candidate node')}: {last} in the last grid"
+                task, completed=grids, description=f"{counted(nodes, 'candidate node')}: {last} in this grid"
             )
 
         found = candidate_nodes(machine, nodes, progress=tried)
