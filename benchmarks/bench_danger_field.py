@@ -52,14 +52,14 @@ def bench(repeats: int = 20_000, seed: int = 0) -> dict[str, object]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=20_000)
-    parser.add_argument("--json", type=Path, help="write the result to this file")
+    parser.add_argument("--out", type=Path, help="write the result to this file")
     arguments = parser.parse_args()
     result = bench(arguments.repeats)
     print(f"{result['name']}: {POINTS} points x {LINKS} links, {result['repeats']} calls")
     print(f"  median {result['median_us']:.1f} µs   p99 {result['p99_us']:.1f} µs   max {result['max_us']:.1f} µs")
     print(f"  goal: median <= {GOAL_US:.0f} µs: {'met' if result['ok'] else 'missed'}")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(result, indent=2) + "\n")
+    if arguments.out:
+        arguments.out.write_text(json.dumps(result, indent=2) + "\n")
 
 
 if __name__ == "__main__":

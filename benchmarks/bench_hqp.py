@@ -269,7 +269,7 @@ def main() -> None:
     parser.add_argument(
         "--only", choices=SOLVERS, nargs="+", default=list(SOLVERS), metavar="SOLVER", help="of: %(choices)s"
     )
-    parser.add_argument("--json", type=Path, help="also write the result to this file")
+    parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
     from qpsafe.timing import machine
 
@@ -280,8 +280,8 @@ def main() -> None:
         f"{result['problems']} random problems, {result['well_conditioned']} well-conditioned [µs]", result["random"]
     )
     report(f"drifting sequence with active limits, {result['ticks']} ticks [µs]", result["drift"])
-    if arguments.json:
-        arguments.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    if arguments.out:
+        arguments.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

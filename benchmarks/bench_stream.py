@@ -1,6 +1,6 @@
 """`qpsafe stream` against `qpsafe irc5-sim` on loopback, two processes, 250 Hz: how often is an answer late?
 
-python benchmarks/bench_stream.py [--duration 600] [--busy 0 2] [--real-time no yes] [--json FILE]
+python benchmarks/bench_stream.py [--duration 600] [--busy 0 2] [--real-time no yes] [--out FILE]
 
 The first experiment is played over and over. "missed": answered more than 4 ms after the packet arrived in the kernel,
 superseded by a newer packet before it was answered, or lost. Memory: of the stream's process, from 5 s after the
@@ -20,6 +20,7 @@ from typing import Any
 
 from qpsafe.sim.irc5_compare import stream_process
 from qpsafe.timing import machine
+from qpsafe.words import growth
 
 MAIN = "from qpsafe.cli.main import main; main()"
 BUSY = "import numpy as np\nx = np.ones(10000)\nwhile True:\n    x = x * 1.0000001 + sum(range(1000)) * 1e-12"
@@ -58,7 +59,7 @@ def show(result: dict[str, Any]) -> None:
     response, parts = stream["response"], stream["missed_parts"]
     granted = ", ".join(name for name, given in stream["granted"].items() if given)
     share = 100.0 * stream["missed"] / max(stream["packets"], 1)
-    growth = stream["memory"]["growth"]
+    change = stream["memory"]["growth"]
     print(f"{result['duration']:g} s, {result['busy']} busy processes; granted: {granted}")
     answered, missed, packets = stream["answered_in_time"], stream["missed"], stream["packets"]
     print(f"  answered in time {answered} of {packets}, missed {missed}: {share:.4f} %")
@@ -70,7 +71,7 @@ def show(result: dict[str, Any]) -> None:
         f"  robot: {counts['sent']} cycles, {counts['missed']} without an answer, {robot['late']} began more than 4 ms"
         f" late themselves (latest {1e3 * robot['latest']:.1f} ms)"
     )
-    print(f"  memory: grown by {'?' if growth is None else f'{growth / 1e6:.3f}'} MB")
+    print("  memory: " + ("unknown" if change is None else growth(change)))
     beat, tick = stream["watchdog"]["oldest_heartbeat"], stream["longest_controller_tick"]
     print(f"  oldest heartbeat {1e3 * beat:.1f} ms, longest controller tick {1e3 * tick:.2f} ms, {stream['causes']}")
 
@@ -80,7 +81,7 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=600.0, help="of each run [s]")
     parser.add_argument("--busy", type=int, nargs="+", default=[0, 2], help="busy processes beside it")
     parser.add_argument("--real-time", choices=("no", "yes"), nargs="+", default=["no", "yes"])
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
     results = []
     print("; ".join(f"{key}: {value}" for key, value in machine().items() if key in ("processor", "system", "python")))
@@ -89,9 +90,9 @@ def main() -> None:
             results.append(run(arguments.duration, busy, real_time == "yes"))
             show(results[-1])
             sys.stdout.flush()
-    if arguments.json:
+    if arguments.out:
         content = {"machine": machine(), "results": results}
-        arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        arguments.out.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

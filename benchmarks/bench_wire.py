@@ -1,6 +1,6 @@
 """The closed loop over the wire, with two processes, against the same loop in one process.
 
-python benchmarks/bench_wire.py [--experiment fixed] [--duration 60] [--real-time] [--json FILE]
+python benchmarks/bench_wire.py [--experiment fixed] [--duration 60] [--real-time] [--out FILE]
 python benchmarks/bench_wire.py --experiment pick-and-place --cycles 10 --duration 200 [--only-lock-step]
 
 In lock-step the robot waits for every answer, so that the wire has no delay. In real time an answer acts one cycle
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=0, help="pick-and-place: end after so many screws")
     parser.add_argument("--real-time", action="store_true", help="SCHED_FIFO for both processes")
     parser.add_argument("--only-lock-step", action="store_true", help="nothing that needs an idle computer")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
     name, duration, cycles = arguments.experiment, arguments.duration, arguments.cycles
     robot, settings = load_robot("irb140"), EgmSettings(ramp_in=0.05)
@@ -65,8 +65,8 @@ def main() -> None:
             "robot": seen.to_dict(),
             "stream": report,
         }
-    if arguments.json:
-        arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    if arguments.out:
+        arguments.out.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 def fate(course: Course) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Fuzz what a robot may send: python benchmarks/fuzz_egm.py [--datagrams N] [--atheris RUNS] [--json FILE].
+"""Fuzz what a robot may send: python benchmarks/fuzz_egm.py [--datagrams N] [--atheris RUNS] [--out FILE].
 
 Datagrams, most of them made from valid packets, go into a session that drives a robot. None may raise; one that is
 refused may change nothing but its count; one that is accepted must mean the same to an independent message module.
@@ -256,7 +256,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--atheris", type=int, metavar="RUNS", help="let coverage choose the datagrams instead")
     parser.add_argument("--corpus", help=argparse.SUPPRESS)
-    parser.add_argument("--json", type=Path, help="write the report to this file")
+    parser.add_argument("--out", type=Path, help="write the report to this file")
     arguments = parser.parse_args()
     if arguments.atheris:
         sys.exit(fuzz_by_coverage(arguments.atheris, arguments.corpus))
@@ -272,8 +272,8 @@ def main() -> None:
         if report["ok"]
         else "some datagrams were not accounted for"
     )
-    if arguments.json:
-        arguments.json.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    if arguments.out:
+        arguments.out.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     sys.exit(0 if report["ok"] else 1)
 
 

@@ -20,6 +20,7 @@ from qpsafe.laws.problem import Law, LawResult
 from qpsafe.returns import RecoveryRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -99,7 +100,7 @@ def checked_field(field: Any) -> Any:
 def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:
     """`evasion`, if it is one of this robot and this tick."""
     if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
-        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {robot.nq} joints")
+        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {counted(robot.nq, 'joint')}")
     if evasion.dt != dt:
         raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
     return evasion

@@ -11,6 +11,7 @@ from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.reference import JointReference
 from qpsafe.resolve import Resolved
+from qpsafe.words import counted
 
 #: The tick went as planned.
 OK = "ok"
@@ -110,7 +111,7 @@ class Tick:
         lines = [
             f"tick {self.reference.seq} at {self.reference.time:.3f} s: {self.status}, "
             f"{self.regime} danger, {self.phase}",
-            f"  {len(self.points)} points, CDF_n = {self.cdf_n:.3f}, m = {self.m:.3f}, f = {self.f:.3f}",
+            f"  {counted(len(self.points), 'point')}, CDF_n = {self.cdf_n:.3f}, m = {self.m:.3f}, f = {self.f:.3f}",
         ]
         for k, (error, activation) in enumerate(zip(self.errors, self.activations, strict=False)):
             lines.append(f"  task {k + 1}: activation {activation:.3f}, error norm {np.linalg.norm(error):.3g}")

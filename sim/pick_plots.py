@@ -10,7 +10,8 @@ import numpy as np
 from qpsafe.danger.activation import Activation
 from qpsafe.sim.pick_place import PickRun
 from qpsafe.sim.pick_report import PickFigures, cost
-from qpsafe.sim.plots import STYLE, save, shade
+from qpsafe.sim.plots import STYLE, plain, save, shade
+from qpsafe.words import counted
 
 BLUE, RED, GREEN, GREY, OCHRE = "#0b5fa5", "#c0392b", "#2a8c3c", "#555555", "#b07a00"
 ROWS = (
@@ -62,12 +63,14 @@ def timeline(run: PickRun, people: Sequence[str], path: Path, title: str = "") -
             time = event.tick * log.dt
             if time > last + 5.0:  # one name for what is done in one visit
                 row = 2 if event.kind == "take" else 3
-                axes[3].annotate(f"{people[event.person]} ", (time - 0.8, -row), fontsize=7, va="center", ha="right")
+                axes[3].annotate(
+                    f"{plain(people[event.person])} ", (time - 0.8, -row), fontsize=7, va="center", ha="right"
+                )
             last = time
         axes[3].set(yticks=-np.arange(len(ROWS)), yticklabels=labels, ylim=(0.6 - len(ROWS), 0.6), xlabel="time [s]")
         axes[3].set_xlim(0.0, log.time[-1])
         if title:
-            figure.suptitle(title, fontsize=10)
+            figure.suptitle(plain(title), fontsize=10)
         save(figure, path)
 
 
@@ -89,6 +92,9 @@ def seeds_figure(runs: Sequence[PickFigures], alone: PickFigures, path: Path) ->
         right.boxplot(costs, widths=0.4, showfliers=False)
         right.plot(1.0 + 0.02 * np.linspace(-5, 5, len(costs)), costs, ".", color=BLUE, markersize=5)
         right.set(
-            ylabel="cost of people [s per cycle]", xticks=[1], xticklabels=[f"{len(runs)} seeds"], ylim=(0.0, None)
+            ylabel="cost of people [s per cycle]",
+            xticks=[1],
+            xticklabels=[counted(len(runs), "seed")],
+            ylim=(0.0, None),
         )
         save(figure, path)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from qpsafe.sim.pick_place import PickRun
 from qpsafe.sim.report import Check
+from qpsafe.words import counted
 
 STANDSTILL = 1e-3  # a robot that moves slower than this stands still [m/s]
 
@@ -108,7 +109,12 @@ def promises(runs: Sequence[PickFigures], alone: PickFigures, cycles: int) -> li
     contacts, nearest = sum(item.contacts for item in runs), min(item.nearest_moving for item in runs)
     strikes = min(item.clearance for item in every)
     return [
-        Check(f"{cycles} cycles done", f"{len(every) - unfinished} of {len(every)} runs", "all", unfinished == 0),
+        Check(
+            f"{counted(cycles, 'cycle')} done",
+            f"{len(every) - unfinished} of {counted(len(every), 'run')}",
+            "all",
+            unfinished == 0,
+        ),
         Check("screws delivered, in the worst run", str(delivered), str(cycles), delivered == cycles),
         Check("screws missed or lost", str(wrong), "0", wrong == 0),
         Check(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qpsafe.placement.statistics import clopper_pearson
+from qpsafe.sim.plots import plain, save
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.placement.study import Study
@@ -31,7 +33,14 @@ def figure_9(result: Study, path: Path, title: str) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    style = {"font.size": 9, "axes.grid": True, "grid.color": "#d0d0d0", "grid.linewidth": 0.5, "legend.fontsize": 8}
+    style = {
+        "font.size": 9,
+        "axes.grid": True,
+        "grid.color": "#d0d0d0",
+        "grid.linewidth": 0.5,
+        "legend.fontsize": 8,
+        "savefig.dpi": 160,
+    }
     with plt.rc_context(style):
         figure, axes = plt.subplots(3, 1, figsize=(7.2, 8.6), sharex=True, layout="constrained")
         optimised, independent = result.samples
@@ -62,14 +71,11 @@ def figure_9(result: Study, path: Path, title: str) -> None:
         axes[2].set_xlabel("number of spots")
         axes[2].set_xlim(0, len(curve.order))
         figure.suptitle(
-            f"{title}: {len(curve.order)} nodes. Thick: {independent.pairs} independent pairs with 95 % bands; "
-            "thin: optimised pairs",
+            f"{plain(title)}: {counted(len(curve.order), 'node')}. Thick: "
+            f"{counted(independent.pairs, 'independent pair')} with 95 % bands; thin: optimised pairs",
             fontsize=9,
         )
-        part = path.with_name("." + path.name + ".part.png")
         try:
-            figure.savefig(part, dpi=160)
-            part.replace(path)
+            save(figure, path)
         finally:
-            part.unlink(missing_ok=True)
             plt.close(figure)

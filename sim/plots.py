@@ -51,7 +51,7 @@ def figure_11(log: RunLog, path: Path, title: str = "", activation: Activation |
         axes[3].set_xlabel("time [s]")
         axes[3].set_xlim(log.time[0], log.time[-1])
         if title:
-            figure.suptitle(title, fontsize=10)
+            figure.suptitle(plain(title), fontsize=10)
         save(figure, path)
 
 
@@ -74,7 +74,7 @@ def _distances(axis: Axes, log: RunLog) -> None:
     for i, name in enumerate(log.spot_names):
         seen = np.where(np.isfinite(log.distances[:, i]), log.distances[:, i], np.nan)
         if np.isfinite(seen).any():
-            axis.plot(log.time, seen, color=colours[i], linewidth=0.9, label=name)
+            axis.plot(log.time, seen, color=colours[i], linewidth=0.9, label=plain(name))
     axis.set_ylabel("(a) spot\ndistance [m]")
     axis.set_ylim(0.0, 0.85)
     _legend(axis, fontsize=6)
@@ -129,6 +129,11 @@ def _figure(rows: int, width: float, height: float, ratios: tuple[float, ...] | 
 
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+
+
+def plain(text: str) -> str:
+    """A name from a file for a figure: matplotlib takes what stands between dollars for mathematics."""
+    return text.replace("$", r"\$")
 
 
 def save(figure: Any, path: Path) -> None:

@@ -20,6 +20,7 @@ from qpsafe.sim.distance import board_distance, person_distance
 from qpsafe.sim.loop import FixedLoop
 from qpsafe.sim.sick_cases import CASES, WINDOW, Case, Reaction, Record, Window
 from qpsafe.speed_cap import wire_speed
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.sim.fixed import FixedExperiment
@@ -59,8 +60,10 @@ class Result(NamedTuple):
     nearest_healthy: float
 
     @property
-    def kept(self) -> bool:
-        """Whether all that is promised was seen."""
+    def kept(self) -> bool | None:
+        """Whether all that is promised was seen; None if the case could show at no moment and nothing else broke."""
+        if not self.applied and self.contacts == 0 and self.passed <= LIMIT_TOLERANCE:
+            return None
         in_time = self.missing == 0 and self.slowest <= self.within
         return in_time and self.contacts == 0 and self.passed <= LIMIT_TOLERANCE
 
@@ -105,7 +108,7 @@ def run_matrix(
         if progress is not None and k % 100 == 0:
             progress(k, total)
     if len(copies) < count:
-        raise ConfigurationError("run_matrix", "count", count, f"at most {len(copies)} moments for this run")
+        raise ConfigurationError("run_matrix", "count", count, f"at most {counted(len(copies), 'moment')} for this run")
     chosen = np.random.default_rng((seed, 1)).permutation(len(copies))[:count]
     work = [(*copies[n], cases, seed + i) for i, n in enumerate(np.sort(chosen))]
     done: list[list[tuple[Reaction, bool, float, float, float]]] = []

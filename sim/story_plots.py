@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qpsafe.sim.log import RunLog
-from qpsafe.sim.plots import HIGH, MEDIUM, STYLE, save, shade
+from qpsafe.sim.plots import HIGH, MEDIUM, STYLE, plain, save, shade
 
 if TYPE_CHECKING:
     from qpsafe.sim.story import Story
@@ -38,7 +38,7 @@ def plan_figure(story: Story, path: Path, title: str = "") -> None:
         axis.text(0.0, -0.84, "reach 0.81 m", ha="center", va="top", fontsize=7, color="#555555")
         for actor, colour in zip(story.people, _colours(len(story.people)), strict=True):
             _draw(axis, actor, story.duration, colour)
-        axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=title or story.table.title)
+        axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=plain(title or story.table.title))
         figure.legend(loc="outside lower center", ncols=len(story.people))
         save(figure, path)
 
@@ -46,7 +46,7 @@ def plan_figure(story: Story, path: Path, title: str = "") -> None:
 def _draw(axis: Any, actor: Any, duration: float, colour: str) -> None:
     times = np.arange(0.0, duration + 1e-9, 0.05)
     roots = np.array([actor.root(t) for t in times])
-    axis.plot(roots[:, 0], roots[:, 1], color=colour, linewidth=1.4, label=f"{actor.name}, {actor.end:.1f} s")
+    axis.plot(roots[:, 0], roots[:, 1], color=colour, linewidth=1.4, label=f"{plain(actor.name)}, {actor.end:.1f} s")
     axis.plot(*roots[0, :2], "o", color=colour, markersize=5)
     for side in actor.footprints(duration):
         for foot in side:
@@ -89,7 +89,7 @@ def encounter_figure(log: RunLog, path: Path, title: str = "") -> None:
             axes[0].fill_between([], [], color=colour, label=f"{name} danger")
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0)
         if title:
-            figure.suptitle(title, fontsize=10)
+            figure.suptitle(plain(title), fontsize=10)
         save(figure, path)
 
 

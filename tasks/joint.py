@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.task import Misfit, Task
 from qpsafe.tasks.trajectory import FixedJoints, JointSample, Trajectory
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -64,7 +65,7 @@ class JointTask(Task):
             return Misfit("joints", self.joints, f"below {robot.nq}")
         sample = self.trajectory.sample(0.0)
         if not isinstance(sample, JointSample) or sample.position.shape != (robot.nq,):
-            return Misfit("trajectory", self.trajectory, f"a trajectory of {robot.nq} joints")
+            return Misfit("trajectory", self.trajectory, f"a trajectory of {counted(robot.nq, 'joint')}")
         return None
 
 

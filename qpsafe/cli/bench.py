@@ -9,29 +9,33 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, progress_bar, write_text
+from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.outputs import output_file
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.laws.problem import Law
+    from qpsafe.timing import Times
+    from qpsafe.timing_compile import Start
 
 
 def bench(
     ticks: Annotated[int, typer.Option(min=100, help="Number of controller ticks to time.")] = 20_000,
-    json: Annotated[Path | None, typer.Option(help="Also write the results to this JSON file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Also write the results to this JSON file.", callback=output_file(".json"))
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the results as JSON to standard output.")] = False,
     compile: Annotated[
         bool, typer.Option("--compile", help="Time the compilation instead, from an empty cache.")
     ] = False,
 ) -> None:
     """Time the danger field and the whole controller tick; compilation excluded, machine named."""
-    screen = console(False)
+    screen = console(json)
     if compile:
-        _compilation(screen, json)
+        _compilation(screen, out, json)
         return
     screen.print("Warming up (the first time, compiling the kernels takes about 15 s) ...", style="dim")
-    from rich.table import Table
-
     from qpsafe.timing import machine, time_danger_field, time_sensing, time_ticks
     from qpsafe.timing_peers import time_mink, time_pink
 
@@ -50,46 +54,58 @@ def bench(
         pink = time_pink(5000, partial(progress.advance, task))
         if pink is not None:
             rows["pink.solve_ik + daqp: frame, posture, limits"] = pink
-    table = Table(title=f"Wall time [µs], one thread: {machine()['processor']}, Python {machine()['python']}")
-    table.add_column("what")
-    for heading in ("runs", "median", "p99", "p99.9", "max"):
-        table.add_column(heading, justify="right")
+    if not json:
+        show(rows, machine(), screen)
+    _write(screen, out, json, {name: t._asdict() for name, t in rows.items()})
+
+
+def show(rows: dict[str, Times], machine: dict[str, str], screen: Console) -> None:
+    """Print the percentiles."""
+    from qpsafe.cli.sheet import Sheet
+
+    title = f"Wall time [µs], one thread: {machine['processor']}, Python {machine['python']}"
+    sheet = Sheet(title, ("what", "runs", "median", "p99", "p99.9", "max"))
     for name, t in rows.items():
-        table.add_row(name, str(t.runs), *(f"{1e6 * value:.1f}" for value in (t.median, t.p99, t.p999, t.maximum)))
-    screen.print(table)
+        sheet.add_row(name, str(t.runs), *(f"{1e6 * value:.1f}" for value in (t.median, t.p99, t.p999, t.maximum)))
+    screen.print(sheet)
     ratio = rows[MAIN].median / rows[MINK].median
     screen.print(f"The whole tick takes {ratio:.2f} of mink.solve_ik with daqp (medians of this run).")
-    _write(screen, json, {name: t._asdict() for name, t in rows.items()})
 
 
-def _compilation(screen: Console, json: Path | None) -> None:
-    """Table of what each kernel takes to compile, and to load."""
-    from rich.table import Table
-
+def _compilation(screen: Console, out: Path | None, json: bool) -> None:
+    """What each kernel takes to compile, and to load."""
     from qpsafe.timing_compile import time_compilation
 
-    with screen.status("compiling all kernels from an empty cache, in a process of its own ..."):
+    with progress_bar(screen) as progress:
+        progress.add_task("compiling all kernels from an empty cache, in a process of its own", total=None)
         first, later = time_compilation()
-    table = Table(title="Processor time of each kernel")
-    table.add_column("kernel")
-    table.add_column("compiled [s]", justify="right")
-    table.add_column("from the cache [ms]", justify="right")
+    if not json:
+        show_compilation(first, later, screen)
+    _write(screen, out, json, {"empty cache": first._asdict(), "from the cache": later._asdict()})
+
+
+def show_compilation(first: Start, later: Start, screen: Console) -> None:
+    """Print what each kernel takes."""
+    from qpsafe.cli.sheet import Sheet
+
+    sheet = Sheet("Processor time of each kernel", ("kernel", "compiled [s]", "from the cache [ms]"))
     for name, taken in sorted(first.kernels.items(), key=lambda item: -item[1]):
-        table.add_row(name, f"{taken:.2f}", f"{1e3 * later.kernels[name]:.0f}")
-    table.add_section()
-    table.add_row("the whole process, imports included", f"{first.processor:.1f}", f"{1e3 * later.processor:.0f}")
-    table.add_row("the same on the clock", f"{first.wall:.1f}", f"{1e3 * later.wall:.0f}")
-    screen.print(table)
-    _write(screen, json, {"empty cache": first._asdict(), "from the cache": later._asdict()})
+        sheet.add_row(name, f"{taken:.2f}", f"{1e3 * later.kernels[name]:.0f}")
+    sheet.add_row("the whole process, imports included", f"{first.processor:.1f}", f"{1e3 * later.processor:.0f}")
+    sheet.add_row("the same on the clock", f"{first.wall:.1f}", f"{1e3 * later.wall:.0f}")
+    screen.print(sheet)
 
 
-def _write(screen: Console, path: Path | None, results: dict[str, Any]) -> None:
-    """The results in a file, with the machine."""
-    if path is not None:
-        from qpsafe.timing import machine
+def _write(screen: Console, out: Path | None, json: bool, results: dict[str, Any]) -> None:
+    """The results with the machine, in a file and on standard output where they are wanted."""
+    from qpsafe.timing import machine
 
-        write_text(path, json_module.dumps({"machine": machine(), "unit": "s", "results": results}, indent=2) + "\n")
-        screen.print(f"written to {path}")
+    content = {"machine": machine(), "unit": "s", "results": results}
+    if out is not None:
+        write_text(out, json_module.dumps(content, indent=2) + "\n")
+        screen.print(f"written to {out}")
+    if json:
+        print_json(content)
 
 
 #: What a robot with its own sensors runs; everything else is beside it.

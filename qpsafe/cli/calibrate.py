@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import console, print_json, write_text
+from qpsafe.cli.outputs import DRAWN, output_file, try_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,8 +21,13 @@ def calibrate(
     robot: Annotated[
         str | None, typer.Option(help="Robot folder to write calibration.toml into; its spots must all be in the file.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the curves to this file instead.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Also draw curves and residuals into this PNG file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the curves to this file instead.", callback=output_file())
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Also draw curves and residuals into this PNG file.", callback=output_file(*DRAWN)),
+    ] = None,
     tolerance: Annotated[float, typer.Option(min=0.0, help="95 % of the pairs must fit within this [m].")] = 0.01,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
@@ -44,7 +50,7 @@ def calibrate(
         print_json({"file": str(target), "good": good, "spots": [_row(fit) for fit in fits]})
     else:
         _show(fits, tolerance, screen)
-        screen.print(f"written to {target}" + (f", {plot}" if plot else ""), highlight=False)
+        screen.print(f"written to {target}" + (f", {plot}" if plot else ""))
     if not good:
         raise typer.Exit(1)
 
@@ -64,6 +70,7 @@ def _target(robot: str | None, out: Path | None) -> Path:
         raise ConfigurationError("calibrate", "--robot", robot, expected)
     if not (Path(robot) / "robot.toml").is_file():
         raise ConfigurationError("calibrate", "--robot", robot, "a folder with a robot.toml")
+    try_file("qpsafe calibrate", "--robot", Path(robot) / FILE_NAME)
     return Path(robot) / FILE_NAME
 
 
@@ -100,25 +107,25 @@ def _row(fit: Fit) -> dict[str, float | str | int]:
 
 
 def _show(fits: list[Fit], tolerance: float, screen: Console) -> None:
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title="Distance by the fitted curve minus true distance")
-    table.add_column("spot")
-    for heading in ("pairs", "ignored", "rms [cm]", "95 % [cm]", "worst [cm]", "within 1 cm"):
-        table.add_column(heading, justify="right")
+    from qpsafe.cli.sheet import Sheet
+
+    headings = ("spot", "pairs", "ignored", "rms [cm]", "95 % [cm]", "worst [cm]", "within 1 cm")
+    sheet = Sheet("Distance by the fitted curve minus true distance", headings)
     for fit in fits:
         row = _row(fit)
         colour = "green" if fit.error_95 <= tolerance else "red"
-        table.add_row(
+        sheet.add_row(
             fit.spot,
             str(row["pairs"]),
             str(row["ignored"]),
             f"{100 * float(row['rms']):.2f}",
-            f"[{colour}]{100 * fit.error_95:.2f}[/]",
+            Text(f"{100 * fit.error_95:.2f}", colour),
             f"{100 * float(row['worst']):.2f}",
             f"{100 * fit.share_within_1_cm:.1f} %",
         )
-    screen.print(table)
+    screen.print(sheet)
 
 
 def _plot(fits: list[Fit], path: Path) -> None:
@@ -126,6 +133,7 @@ def _plot(fits: list[Fit], path: Path) -> None:
 
     matplotlib.use("Agg")
     from qpsafe.sensing.calibration_plot import calibration_figure
+    from qpsafe.sim.plots import save
 
-    figure = calibration_figure(fits)
-    figure.savefig(path, dpi=160)
+    with matplotlib.rc_context({"savefig.dpi": 160}):
+        save(calibration_figure(fits), path)

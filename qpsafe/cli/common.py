@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,9 +11,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from typer.core import TyperGroup
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
+    from rich.text import Text
 
     from qpsafe.laws.problem import Law
     from qpsafe.sim.report import Check
@@ -31,6 +35,16 @@ class ProjectionName(StrEnum):
 
     strict = "strict"
     paper = "paper"
+
+
+class Group(TyperGroup):
+    """A group whose help shows the whole first paragraph of each command, wrapped."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write name and first paragraph of every command."""
+        rows = [(name, " ".join((c.help or "").split("\n\n")[0].split())) for name, c in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 class SensorName(StrEnum):
@@ -54,10 +68,22 @@ def make_law(name: LawName, projection: ProjectionName, solver: str | None = Non
 
 
 def console(json_output: bool) -> Console:
-    """Where people read: the screen, or standard error when a program reads standard output."""
+    """Where people read: the screen, or standard error when a program reads standard output.
+
+    Text is plain: brackets and colons in names from files mean nothing, colours are given as styles. With NO_COLOR set
+    there are none at all, whatever else is set.
+    """
     from rich.console import Console
 
-    return Console(stderr=json_output)
+    colours = None if os.environ.get("NO_COLOR") else "auto"
+    return Console(stderr=json_output, markup=False, emoji=False, highlight=False, color_system=colours)  # type: ignore[arg-type]
+
+
+def verdict(good: bool, yes: str = "kept", no: str = "NOT kept") -> Text:
+    """A word in green, or another one in red."""
+    from rich.text import Text
+
+    return Text(yes, "green") if good else Text(no, "red")
 
 
 @contextmanager
@@ -71,13 +97,14 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
+    columns = (  # where room is short, the bar gives way and a long description is wrapped: nothing is cut
+        TextColumn("{task.description}", markup=False, table_column=Column()),
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(table_column=Column(no_wrap=True)),
+        TimeElapsedColumn(table_column=Column(no_wrap=True)),
+        TimeRemainingColumn(table_column=Column(no_wrap=True)),
     )
     with Progress(*columns, console=screen) as progress:
         yield progress
@@ -85,15 +112,12 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
 
 def show_checks(title: str, checks: Sequence[Check], screen: Console) -> None:
     """Print what was measured beside what was promised."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
-    table = Table(title=title)
-    for heading in ("", "", "measured", "promised"):
-        table.add_column(heading, overflow="fold")
+    sheet = Sheet(title, ("", "", "measured", "promised"), text=range(4))
     for check in checks:
-        mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
-        table.add_row(mark, check.name, check.measured, check.promised)
-    screen.print(table)
+        sheet.add_row(verdict(check.kept), check.name, check.measured, check.promised)
+    screen.print(sheet)
 
 
 def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], screen: Console, as_json: bool) -> None:
@@ -104,7 +128,7 @@ def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], sc
     """
     import typer
 
-    good = all(result.kept for result in results)
+    good = all(result.kept is not False for result in results)  # None: it could show at no moment
     if as_json:
         print_json({"good": good, "cases": [result._asdict() | {"kept": result.kept} for result in results]})
     else:

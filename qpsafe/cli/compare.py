@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, print_json, progress_bar
+from qpsafe.cli.common import console, print_json, progress_bar, verdict
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -89,26 +90,22 @@ def _show(
     found: dict[str, list[Deviation]], loop: ClosedLoop | None, tolerance: float, good: bool, screen: Console
 ) -> None:
     import numpy as np
-    from rich.table import Table
 
-    table = Table(title="Deviation from eq. (22), max-norm of q̇ in rad/s: paper projection")
-    table.add_column("states of the kind")
-    for heading in ("number", "median", "worst", "worst, limits inactive", "largest q̇"):
-        table.add_column(heading, justify="right")
+    from qpsafe.cli.sheet import Sheet
+
+    headings = ("states of the kind", "number", "median", "worst", "worst, limits inactive", "largest q̇")
+    sheet = Sheet("Deviation from eq. (22), max-norm of q̇ in rad/s: paper projection", headings)
     inactive = {d.kind: d for d in found["paper, limits inactive"]}
     for d in found["paper"]:
         numbers = (f"{d.median:.1e}", f"{d.worst:.1e}", f"{inactive[d.kind].worst:.1e}", f"{d.speeds.max():.0f}")
-        table.add_row(d.kind, str(len(d.values)), *numbers)
-    screen.print(table)
+        sheet.add_row(d.kind, str(len(d.values)), *numbers)
+    screen.print(sheet)
 
-    table = Table(title="All laws, all states")
-    table.add_column("law")
-    for heading in ("number", "median", "worst"):
-        table.add_column(heading, justify="right")
+    sheet = Sheet("All laws, all states", ("law", "number", "median", "worst"))
     for name, deviations in found.items():
         values = np.concatenate([d.values for d in deviations])
-        table.add_row(name, str(len(values)), f"{np.median(values):.1e}", f"{values.max():.1e}")
-    screen.print(table)
+        sheet.add_row(name, str(len(values)), f"{np.median(values):.1e}", f"{values.max():.1e}")
+    screen.print(sheet)
     screen.print(
         "strict differs from (22) by intent wherever tasks are not orthogonal; weighted has soft priorities",
         style="dim",
@@ -118,10 +115,10 @@ def _show(
         screen.print(
             f"whole runs of {loop.duration:g} s, limits off: joint trajectories within "
             f"{loop.trajectory_deviation:.1e} rad (tolerance 1e-06)\n"
-            f"limits on: {loop.different} of {loop.ticks} ticks ({share:.2f} %) differ from (22), in {loop.explained} "
-            f"of them a limit binds; median {loop.median:.1e}, worst {loop.worst:.2g} rad/s\n"
+            f"limits on: {loop.different} of {counted(loop.ticks, 'tick')} ({share:.2f} %) differ from (22), in "
+            f"{loop.explained} of them a limit binds; median {loop.median:.1e}, worst {loop.worst:.2g} rad/s\n"
             f"largest step of q̇ relative to a_max dt: {loop.largest_step:.3f} with limits, "
             f"{loop.largest_step_source:.3f} by (22) alone",
             highlight=False,
         )
-    screen.print(f"[green]equal within {tolerance:g}[/]" if good else f"[red]deviation above {tolerance:g}[/]")
+    screen.print(verdict(good, f"equal within {tolerance:g}", f"deviation above {tolerance:g}"))

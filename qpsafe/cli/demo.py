@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import (
+    Group,
     LawName,
     ProjectionName,
     SensorName,
@@ -24,6 +25,7 @@ from qpsafe.cli.common import (
 from qpsafe.cli.demo_fast import fast_person
 from qpsafe.cli.demo_path import path
 from qpsafe.cli.demo_pick import pick_and_place
+from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from qpsafe.sim.report import Report
     from qpsafe.sim.run_file import StateRecorder
 
-app = typer.Typer(help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
+app = typer.Typer(cls=Group, help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
 
 
 @app.command()
@@ -65,7 +67,7 @@ def fixed(
         str | None, typer.Option(help="Other sensors: a file in the robot's folder, as spots-by-hand.toml, or a path.")
     ] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the source's.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fixed"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
@@ -113,8 +115,8 @@ def fixed(
         else:
             show(report, title, screen)
             if story is not None:
-                screen.print(near.sentence(), highlight=False)
-            screen.print(f"written to {out}: {', '.join(files)}", highlight=False)
+                screen.print(near.sentence())
+            screen.print(f"written to {out}: {', '.join(files)}")
     if not kept:
         raise typer.Exit(1)
 
@@ -180,7 +182,7 @@ def observed(
             except MissingExtraError as error:
                 available, reason = False, str(error)
             if not available:
-                screen.print(f"no video: {reason}", style="yellow", highlight=False)
+                screen.print(f"no video: {reason}", style="yellow")
         if view:
             viewer = Viewer(experiment.scene, spots, activation)
             stack.callback(viewer.close)
@@ -217,17 +219,18 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
 
 def show(report: Report, title: str, screen: Console) -> None:
     """Print the report as tables."""
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title=f"First experiment, {title}: largest errors in each regime, commanded and measured pose")
-    table.add_column("danger")
-    units = ("from, s", "to, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad")
-    for heading in units:
-        table.add_column(heading, justify="right")
+    from qpsafe.cli.sheet import Sheet
+
+    sheet = Sheet(
+        f"First experiment, {title}: largest errors in each regime, commanded and measured pose",
+        ("danger", "from, s", "to, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad"),
+    )
     colours = {"low": "green", "medium": "yellow", "high": "red"}
     for row in report.regimes:
-        table.add_row(
-            f"[{colours.get(row.regime, 'white')}]{row.regime}[/]",
+        sheet.add_row(
+            Text(row.regime, colours.get(row.regime, "")),
             f"{row.entered:.2f}",
             f"{row.left:.2f}",
             f"{row.cdf_n:.2f}",
@@ -236,24 +239,22 @@ def show(report: Report, title: str, screen: Console) -> None:
             f"{1e3 * row.measured_position_error:.3f}",
             f"{row.measured_orientation_error:.4f}",
         )
-    screen.print(table)
+    screen.print(sheet)
 
     if report.approaches:
-        table = Table(title="Smallest true distance between robot and board")
-        for heading in ("approach [s]", "with controller [m]", "without [m]", "gained [m]"):
-            table.add_column(heading, justify="right")
+        headings = ("approach [s]", "with controller [m]", "without [m]", "gained [m]")
+        sheet = Sheet("Smallest true distance between robot and board", headings, text=())
         for approach in report.approaches:
             gained = approach.with_controller - approach.without_controller
             numbers = (approach.with_controller, approach.without_controller, gained)
-            table.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
-        screen.print(table)
+            sheet.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
+        screen.print(sheet)
 
     show_checks("What the run should show", report.checks, screen)
     position, orientation = report.tracking
     screen.print(
         f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "
-        f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else ""),
-        highlight=False,
+        f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else "")
     )
 
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, write_text
+from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, verdict, write_text
+from qpsafe.cli.outputs import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,7 +27,9 @@ def fast_person(
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[ProjectionName, typer.Option(help="Of the hierarchical law.")] = ProjectionName.strict,
     lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s].")] = 0.0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-fast-person"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
+        "out/demo-fast-person"
+    ),
     video: Annotated[bool, typer.Option(help="Write an mp4 of every run.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the runs in MuJoCo's viewer; needs a display.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON to standard output.")] = False,
@@ -73,24 +76,21 @@ def fast_person(
         print_json(rows)
     else:
         show(found, screen)
-        screen.print(f"written to {out}: figure.png, table.json, run-*.npz", highlight=False)
+        screen.print(f"written to {out}: figure.png, table.json, run-*.npz")
 
 
 def show(found: list[FastRun], screen: Console) -> None:
     """Print the table."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
-    table = Table(title="Somebody walks straight at the robot")
-    table.add_column("run")
-    for heading in ("walks\n[m/s]", "con-\ntact", "at\n[s]", "least\ngap\n[mm]", "robot\nthen\n[m/s]",
-                    "closing\n[m/s]", "moving in\ncontact\n[s]", "CDF_n"):  # fmt: skip
-        table.add_column(heading, justify="right")
+    numbers = ("at [s]", "least gap [mm]", "robot then [m/s]", "closing [m/s]", "moving in contact [s]", "CDF_n")
+    sheet = Sheet("Somebody walks straight at the robot", ("run", "walks [m/s]", "contact", *numbers))
     for run in found:
         e = run.encounter
-        table.add_row(
+        sheet.add_row(
             run.experiment,
             f"{run.speed:.1f}",
-            "no" if e.contact is None else "[red]yes[/]",
+            verdict(e.contact is None, "no", "yes"),
             f"{e.time if e.contact is None else e.contact:.2f}",
             f"{1e3 * e.distance:.0f}",
             f"{e.robot_speed:.3f}",
@@ -98,4 +98,4 @@ def show(found: list[FastRun], screen: Console) -> None:
             f"{e.moving_contact:.2f}",
             f"{e.danger:.0f}",
         )
-    screen.print(table)
+    screen.print(sheet)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, show_checks, write_text
+from qpsafe.cli.outputs import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +31,7 @@ def path(
     program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the bundled.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-path"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-path"),
     video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
@@ -80,7 +81,7 @@ def path(
     }
     first = experiments["strict"]
     cycle = first.reference.duration  # a wrong program is refused before anything is written or run
-    screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim", highlight=False)
+    screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim")
     out.mkdir(parents=True, exist_ok=True)
     runs, found, near = {}, {}, {}
     with progress_bar(screen) as progress:
@@ -107,16 +108,16 @@ def path(
         show(found, checks, screen)
         if told is not None:
             for name, item in near.items():
-                screen.print(f"{name}: {item.sentence()}", highlight=False)
+                screen.print(f"{name}: {item.sentence()}")
         files = "figure.png, side-by-side.png, report.json, signals-*.csv, run-*.npz"
-        screen.print(f"written to {out}: {files}", highlight=False)
+        screen.print(f"written to {out}: {files}")
     if not result["kept"]:
         raise typer.Exit(1)
 
 
 def show(found: dict[str, PathFigures], checks: list[Check], screen: Console) -> None:
     """Print figures and promises as tables."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
     rows: list[tuple[str, Any]] = [
         ("on the line, low danger, constant speed: orientation error [rad]", lambda f: f"{f.line_orientation:.2g}"),
@@ -132,11 +133,8 @@ def show(found: dict[str, PathFigures], checks: list[Check], screen: Console) ->
         ("suspensions", lambda f: str(f.suspensions)),
         ("path travelled [s]", lambda f: f"{f.travelled:.2f}"),
     ]
-    table = Table(title="Second experiment: largest figures of each run")
-    table.add_column("")
-    for name in found:
-        table.add_column(name, justify="right")
+    sheet = Sheet("Second experiment: largest figures of each run", ("", *found))
     for label, text in rows:
-        table.add_row(label, *(text(item) for item in found.values()))
-    screen.print(table)
+        sheet.add_row(label, *(text(item) for item in found.values()))
+    screen.print(sheet)
     show_checks("What the runs should show", checks, screen)

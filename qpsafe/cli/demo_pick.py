@@ -20,6 +20,8 @@ from qpsafe.cli.common import (
     show_checks,
     write_text,
 )
+from qpsafe.cli.outputs import output_folder
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,7 +51,9 @@ def pick_and_place(
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
     jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo-pick-and-place"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
+        "out/demo-pick-and-place"
+    ),
     video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
@@ -80,9 +84,7 @@ def pick_and_place(
     # wrong files are refused before anything is written or run
     length = experiment.reference.duration / len(experiment.cell.holes)
     names = [person.name for person in experiment.people]
-    screen.print(
-        f"a cycle takes {length:.1f} s by the program; {' and '.join(names)} come", style="dim", highlight=False
-    )
+    screen.print(f"a cycle takes {length:.1f} s by the program; {' and '.join(names)} come", style="dim")
     out.mkdir(parents=True, exist_ok=True)
     with progress_bar(screen) as progress:
         run = _first(experiment, out, video, view, screen, progress)
@@ -101,7 +103,7 @@ def pick_and_place(
         print_json(result)
     else:
         show(runs, alone, checks, screen)
-        screen.print(f"written to {out}: {', '.join([*files, 'report.json'])}", highlight=False)
+        screen.print(f"written to {out}: {', '.join([*files, 'report.json'])}")
     if not result["kept"]:
         raise typer.Exit(1)
 
@@ -133,7 +135,7 @@ def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Con
     files = ["signals.csv", "figure.png", "run.npz"]
     available, reason = gl_available()
     if not available:
-        screen.print(f"no snapshots: {reason}", style="yellow", highlight=False)
+        screen.print(f"no snapshots: {reason}", style="yellow")
     elif draw(experiment, run, out / "snapshots.png"):
         files.append("snapshots.png")
     return files
@@ -141,35 +143,32 @@ def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Con
 
 def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check], screen: Console) -> None:
     """Print figures and promises as tables."""
-    from rich.table import Table
-
+    from qpsafe.cli.sheet import Sheet
     from qpsafe.sim.pick_report import cost, spread
 
-    table = Table(title="Third experiment: screws")
-    for heading in ("seed", "delivered", "missed", "lost", "taken", "placed", "all cycles, s", "cost, s/cycle"):
-        table.add_column(heading, justify="right")
+    counts = ("delivered", "missed", "lost", "taken", "placed")
+    sheet = Sheet("Third experiment: screws", ("seed", *counts, "all cycles, s", "cost, s/cycle"))
     for item in (alone, *runs):
-        counts = (item.delivered, item.missed, item.lost, item.taken, item.placed)
+        numbers = (item.delivered, item.missed, item.lost, item.taken, item.placed)
         extra = "-" if item is alone else f"{cost(item, alone):.2f}"
-        table.add_row(_seed(item, alone), *map(str, counts), f"{item.duration:.1f}", extra)
-    screen.print(table)
-    table = Table(title="Third experiment: safety")
-    for heading in ("seed", "nearest, m", "moving, m", "contacts", "tables, mm", "suspended", "largest CDF_n"):
-        table.add_column(heading, justify="right")
+        sheet.add_row(_seed(item, alone), *map(str, numbers), f"{item.duration:.1f}", extra)
+    screen.print(sheet)
+    headings = ("seed", "nearest, m", "moving, m", "contacts", "tables, mm", "suspended", "largest CDF_n")
+    sheet = Sheet("Third experiment: safety", headings)
     for item in (alone, *runs):
         gaps = ("-" if item is alone else f"{value:.3f}" for value in (item.nearest, item.nearest_moving))
         rest = (str(item.contacts), f"{1e3 * item.clearance:.1f}", str(item.suspensions), f"{item.danger:.1f}")
-        table.add_row(_seed(item, alone), *gaps, *rest)
-    screen.print(table)
+        sheet.add_row(_seed(item, alone), *gaps, *rest)
+    screen.print(sheet)
     costs = spread([cost(item, alone) for item in runs])
     cycle = alone.duration / max(len(alone.cycle_times), 1)
     text = f"a cycle takes {cycle:.2f} s without people; with them it costs {costs['median']:.2f} s more"
     if len(runs) > 1:
         text += (
-            f" (median of {len(runs)} seeds; quartiles {costs['quartile_1']:.2f} and {costs['quartile_3']:.2f}, "
-            f"range {costs['smallest']:.2f} to {costs['largest']:.2f})"
+            f" (median of {counted(len(runs), 'seed')}; quartiles {costs['quartile_1']:.2f} and "
+            f"{costs['quartile_3']:.2f}, range {costs['smallest']:.2f} to {costs['largest']:.2f})"
         )
-    screen.print(text, highlight=False)
+    screen.print(text)
     show_checks("What the runs should show", checks, screen)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from qpsafe.cli.common import print_json, write_text
+from qpsafe.cli.common import print_json, verdict, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,28 +49,26 @@ def every_robot(
         print_json(table)
     else:
         show_robots(rows, screen)
-        screen.print(f"written to {out}: robots.json and a folder for each robot", highlight=False)
+        screen.print(f"written to {out}: robots.json and a folder for each robot")
     return all(row.kept for row in rows)
 
 
 def show_robots(rows: list[RobotRow], screen: Console) -> None:
     """Print the table."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
-    table = Table(title="First experiment on every bundled robot")
-    table.add_column("robot", no_wrap=True)
-    for heading in ("joints", "links", "order", "peak CDF", "limits", "gained, mm", "kept"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    headings = ("robot", "joints", "links", "order", "peak CDF", "limits", "gained, mm", "kept")
+    sheet = Sheet("First experiment on every bundled robot", headings)
     for row in rows:
         good, of = row.in_order
-        table.add_row(
+        sheet.add_row(
             row.robot,
             str(row.joints),
             str(row.links),
             f"{good} of {of}",
             f"{row.peak:.1f}",
-            "held" if row.limits_held else "[red]PASSED[/]",
+            verdict(row.limits_held, "held", "PASSED"),
             " ".join(f"{1e3 * value:+.0f}" for value in row.gained),
-            "[green]yes[/]" if row.kept else "[red]NO[/]",
+            verdict(row.kept, "yes", "NO"),
         )
-    screen.print(table)
+    screen.print(sheet)

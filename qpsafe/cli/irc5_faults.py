@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import console, progress_bar, show_matrix
+from qpsafe.cli.common import console, progress_bar, show_matrix, verdict
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +31,7 @@ def irc5_faults(
     from qpsafe.sim.irc5_matrix import run_faults
 
     with progress_bar(screen) as progress:
-        task = progress.add_task(f"{moments} moments", total=moments)
+        task = progress.add_task(counted(moments, "moment"), total=moments)
         results = run_faults(
             load_robot("irb140"),
             moments,
@@ -43,20 +44,16 @@ def irc5_faults(
 
 def show(results: list[Result], screen: Console) -> None:
     """Print the matrix."""
-    from rich import box
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(
-        title="Faults of the robot and its wire, each at every moment", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
-    )
-    for heading in ("", "fault and promised reaction"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("seen", "ticks", "speed", "accel.", "seed", "errors"):
-        table.add_column(heading, justify="right")
+    from qpsafe.cli.sheet import Sheet
+
+    headings = ("", "fault and promised reaction", "seen", "ticks", "speed", "accel.", "seed", "errors")
+    sheet = Sheet("Faults of the robot and its wire, each at every moment", headings, text=(0, 1))
     for r in results:
-        table.add_row(
-            "[green]kept[/]" if r.kept else "[red]NOT[/]",
-            f"{r.case}\n  [dim]{r.promise}[/]",
+        sheet.add_row(
+            verdict(r.kept, no="NOT"),
+            Text.assemble(r.case, "\n  ", (r.promise, "dim")),
             f"{r.seen}/{r.moments}",
             f"{r.slowest}/{r.within}",
             f"{r.step:.3f}",
@@ -64,11 +61,10 @@ def show(results: list[Result], screen: Console) -> None:
             "exact" if r.seed <= 1e-9 else f"{r.seed:.1e}",
             str(len(r.errors) + r.unpaired),
         )
-    screen.print(table)
+    screen.print(sheet)
     screen.print(
         "seen: moments in which the reaction came; ticks of 4 ms: slowest, and how many are promised; speed, accel.: "
         "of the reference, largest of what the joint can do; seed: distance from the measured pose of a reference that "
         "starts there; errors: exceptions, and positions that do not go with their speed",
         style="dim",
-        highlight=False,
     )

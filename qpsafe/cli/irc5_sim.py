@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import SensorName, console, print_json, write_text
+from qpsafe.cli.outputs import output_file
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,7 +58,9 @@ def irc5_sim(
     motors_off: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="Motors off [s].")] = None,
     rapid_stop: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="RAPID stopped [s].")] = None,
     real_time: Annotated[bool, typer.Option("--real-time", help="Ask for SCHED_FIFO, for cycles on time.")] = False,
-    log: Annotated[Path | None, typer.Option(help="CSV of measured and referenced joint positions.")] = None,
+    log: Annotated[
+        Path | None, typer.Option(help="CSV of measured and referenced joint positions.", callback=output_file())
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write what was seen as JSON to standard output.")] = False,
 ) -> None:
     """Simulate an IRC5 under EGM that drives the MuJoCo plant, for qpsafe stream in another process.
@@ -112,11 +116,11 @@ def irc5_sim(
     again = None if experiment is Experiment.pick_and_place else period  # screws that were delivered stay there
     run = Irc5Loop(loop, exchange, settings, again)
     if real_time:
-        screen.print(realtime.fifo(70).line, style="dim", highlight=False)
+        screen.print(realtime.fifo(70).line, style="dim")
     realtime.fine_timers()
     realtime.freeze_garbage()
     with Requests().heard() as requests, closing(exchange):
-        screen.print(f"sending to {host}:{port}; Ctrl-C ends", highlight=False)
+        screen.print(f"sending to {host}:{port}; Ctrl-C ends")
         result = run_robot(
             run,
             exchange,
@@ -136,7 +140,7 @@ def irc5_sim(
     else:
         show(result, screen)
         if parts is not None:
-            screen.print("screws: " + ", ".join(f"{place} {n}" for place, n in parts.items()), highlight=False)
+            screen.print("screws: " + ", ".join(f"{place} {n}" for place, n in parts.items()))
     if result.counts["answered"] == 0:
         raise typer.Exit(1)
 
@@ -156,7 +160,7 @@ def span(option: str, text: str) -> tuple[float, float]:
 def status(run: RobotRun) -> None:
     """Overwrite the status line, twice a second."""
     if run.cycles % 125 == 0:
-        sys.stderr.write(f"\r{0.004 * run.cycles:8.1f} s  {run.cycles} cycles, {run.late} of them late ")
+        sys.stderr.write(f"\r{0.004 * run.cycles:8.1f} s  {counted(run.cycles, 'cycle')}, {run.late} of them late ")
         sys.stderr.flush()
 
 
@@ -176,6 +180,6 @@ def show(run: RobotRun, screen: Console) -> None:
     screen.print()
     if run.counts["answered"] == 0:
         screen.print("nobody answered", style="yellow")
-    screen.print(f"{run.cycles} cycles, {run.late} of them more than 4 ms late themselves", highlight=False)
-    screen.print(json_module.dumps(counts | {"rejected": run.rejected}), highlight=False)
-    screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s", highlight=False)
+    screen.print(f"{counted(run.cycles, 'cycle')}, {run.late} of them more than 4 ms late themselves")
+    screen.print(json_module.dumps(counts | {"rejected": run.rejected}))
+    screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s")

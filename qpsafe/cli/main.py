@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import signal
 import sys
 from typing import Annotated
@@ -23,13 +24,16 @@ from qpsafe.cli import (
     story,
     stream,
 )
+from qpsafe.cli.common import Group, console
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(
+    cls=Group,
     help="Danger-aware hierarchical QP control for robot arms that share their space with people.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # help is plain text: "[s]" is a unit
 )
 app.add_typer(demo.app, name="demo")
 app.command("compare")(compare.compare)
@@ -75,8 +79,21 @@ def main() -> None:
     try:
         app()
     except QpsafeError as error:
-        typer.secho(f"qpsafe: {error}", fg="red", err=True)
+        _say(f"qpsafe: {error}", "red")
+        sys.exit(1)
+    except OSError as error:  # a full disk, a folder that has gone meanwhile
+        if error.filename is None and error.errno not in _FULL:
+            raise
+        _say(f"qpsafe: {error.filename or 'writing'}: {error.strerror}", "red")
         sys.exit(1)
     except (_Interrupted, KeyboardInterrupt):
-        typer.secho("qpsafe: interrupted, nothing unfinished was left behind", fg="yellow", err=True)
+        _say("qpsafe: interrupted, nothing unfinished was left behind", "yellow")
         sys.exit(130)
+
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def _say(line: str, style: str) -> None:
+    """One line on standard error."""
+    console(True).print(line, style=style, soft_wrap=True)

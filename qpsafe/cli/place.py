@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement.objective import Objective, check_request
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -53,7 +55,7 @@ def place(
     pictures: Annotated[
         bool, typer.Option(help="Draw the robot with nodes and spots, where OpenGL is to be had.")
     ] = True,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/place"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/place"),
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """Place distance sensors: candidate nodes, Monte Carlo simulation, optimisation, Fig. 9, and a spots.toml.
@@ -74,20 +76,31 @@ def place(
     from qpsafe.sim.placement_run import MonteCarlo
 
     machine = load_robot(robot)
-    found = candidate_nodes(machine, nodes)
+    with progress_bar(screen) as progress:
+        wanted = counted(nodes, "candidate node")
+        task = progress.add_task(wanted, total=None)
+
+        def tried(grids: int, last: int) -> None:
+            progress.update(
+                task, completed=grids, description=f"{counted(nodes, 'candidate node')}: {last} in this grid"
+            )
+
+        found = candidate_nodes(machine, nodes, progress=tried)
     check_request(len(found), spots, probability)
     limits = found.caps(machine) if caps else None
     count = spots or min(20, len(found) if limits is None else limits.room())
     check_spots(count, len(found), limits)
-    text = f"{len(found)} nodes, {1e3 * found.spacing:.1f} mm apart, on {len(machine.regions)} regions"
-    screen.print(text, style="dim", highlight=False)
+    regions = counted(len(machine.regions), "region")
+    text = f"{counted(len(found), 'node')}, {1e3 * found.spacing:.1f} mm apart, on {regions}"
+    screen.print(text, style="dim")
     simulation = MonteCarlo(machine, found, seed=seed, radius=radius, pedestal=pedestal)
     samples = []
     with _executor(workers) as executor, progress_bar(screen) as progress:
         for number, name in enumerate(("pairs to optimise for", "independent pairs")):
             task = progress.add_task(name, total=pairs)
             samples.append(simulation.sample(pairs, number, executor, partial(_completed, progress, task)))
-    with screen.status("optimising ...") as status:
+    with progress_bar(screen) as progress:
+        task = progress.add_task("optimising", total=None)
         result = study(
             found,
             (samples[0], samples[1]),
@@ -97,7 +110,7 @@ def place(
             caps=limits,
             time_limit=time_limit,
             exact=exact,
-            progress=lambda name: status.update(f"optimising: {name} ..."),
+            progress=lambda name: progress.update(task, description=f"optimising: {name}", advance=1),
         )
     report = to_dict(result) | {
         "robot": machine.name,
@@ -117,7 +130,7 @@ def place(
         print_json(report)
     else:
         show(result, screen)
-        screen.print(f"written to {out}: spots.toml, report.json, figure-9.png", highlight=False)
+        screen.print(f"written to {out}: spots.toml, report.json, figure-9.png")
 
 
 def _completed(progress: Progress, task: TaskID, done: int) -> None:
@@ -181,9 +194,9 @@ def _remark(title: str, result: Study, command: str, pairs: int) -> str:
     answer, found = result.answer, result.candidates
     goal = "fewest spots for a probability, eq. (13)" if answer.objective == "probability" else answer.objective
     return (
-        f"{len(answer.solution.chosen)} spots on the {title}, made by `{command}`: chosen out of {len(found)} nodes "
-        f"{1e3 * found.spacing:.0f} mm apart for the objective: {goal} ({pairs} pairs, {answer.solution.method}, gap "
-        f"{100 * answer.solution.gap:.1f} %). They detect "
+        f"{counted(len(answer.solution.chosen), 'spot')} on the {title}, made by `{command}`: chosen out of "
+        f"{counted(len(found), 'node')} {1e3 * found.spacing:.0f} mm apart for the objective: {goal} "
+        f"({counted(pairs, 'pair')}, {answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
         f"{100 * answer.fair.probability:.1f} % of an independent sample (95 %: {100 * answer.fair.low:.1f} to "
         f"{100 * answer.fair.high:.1f}). position [m] and direction (unit) are given in the frame of the link that "
         "carries the spot, eq. (7); link counts wire links from 1: the spot's danger vector acts there, eq. (8)."
@@ -192,16 +205,14 @@ def _remark(title: str, result: Study, command: str, pairs: int) -> str:
 
 def show(result: Study, screen: Console) -> None:
     """Print the placements and the chosen spots."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
     pairs = result.samples[1].pairs
-    table = Table(title=f"Judged on {pairs} independent pairs, but for column 5")
-    for heading in ("objective", "spots", "detected", "95 %", "optimised", "danger", "method", "gap"):
-        justify: Any = "left" if heading in ("objective", "method") else "right"
-        table.add_column(heading, justify=justify, no_wrap=True)
+    headings = ("objective", "spots", "detected", "95 %", "optimised", "danger", "method", "gap")
+    sheet = Sheet(f"Judged on {counted(pairs, 'independent pair')}, but for `optimised`", headings, text=(0, 6))
     for name, item in result.placements.items():
         fair, solution = item.fair, item.solution
-        table.add_row(
+        sheet.add_row(
             ("> " if name == result.wanted else "") + ("(13)" if name == "probability" else name),
             str(len(solution.chosen)),
             f"{100 * fair.probability:.1f} %",
@@ -211,6 +222,6 @@ def show(result: Study, screen: Console) -> None:
             solution.method,
             f"{100 * solution.gap:.1f} %",
         )
-    screen.print(table)
+    screen.print(sheet)
     names = [result.candidates.nodes.names[i] for i in result.answer.solution.chosen]
-    screen.print("chosen: " + ", ".join(names), highlight=False)
+    screen.print("chosen: " + ", ".join(names))

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar
+from qpsafe.cli.outputs import output_file
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
 
 def replay(
     file: Annotated[Path, typer.Argument(help="A run.npz that a demo wrote.")],
-    video: Annotated[Path | None, typer.Option(help="Also film the recorded run into this mp4.")] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Also film the recorded run into this mp4.", callback=output_file(".mp4"))
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Also show it in MuJoCo's viewer; needs a display.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
@@ -53,7 +57,7 @@ def replay(
     else:
         _show(found, run, screen)
         if video is not None:
-            screen.print(f"written to {video}", highlight=False)
+            screen.print(f"written to {video}")
     if not found.same:
         raise typer.Exit(1)
 
@@ -90,17 +94,22 @@ def _watchers(run: RunFile, experiment: Any, video: Path | None, view: bool, sta
 
 
 def _show(found: Replay, run: RunFile, screen: Console) -> None:
+    from rich.text import Text
+
     recorded = run.header["versions"].get("qpsafe", "?")
     if found.same:
-        screen.print(f"[green]same[/]: all {found.ticks} ticks, every bit (recorded with qpsafe {recorded})")
+        all_of_it = f": all {counted(found.ticks, 'tick')}, every bit (recorded with qpsafe {recorded})"
+        screen.print(Text.assemble(("same", "green"), all_of_it))
     else:
         first = found.first
         assert first is not None
         screen.print(
-            f"[red]different[/]: {found.different} of {found.ticks} ticks; the first is tick {first.tick} "
-            f"at {first.time:.3f} s: {first.what} was {first.recorded}, is {first.replayed} "
-            f"(difference {first.largest:.3g}); largest difference of q_ref {found.largest:.3g} rad",
-            highlight=False,
+            Text.assemble(
+                ("different", "red"),
+                f": {found.different} of {counted(found.ticks, 'tick')}; the first is tick {first.tick} "
+                f"at {first.time:.3f} s: {first.what} was {first.recorded}, is {first.replayed} "
+                f"(difference {first.largest:.3g}); largest difference of q_ref {found.largest:.3g} rad",
+            )
         )
     for change in found.changed:
-        screen.print(f"changed since: {change}", style="yellow", highlight=False)
+        screen.print(f"changed since: {change}", style="yellow")

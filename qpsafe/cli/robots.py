@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from qpsafe.cli.common import console, print_json
+from qpsafe.cli.common import Group, console, print_json
+from qpsafe.cli.outputs import output_folder, try_folder
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 
-class _NameOrCommand(TyperGroup):
+class _NameOrCommand(Group):
     """`qpsafe robots NAME` means `qpsafe robots inspect NAME`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -43,7 +44,7 @@ def robots(
         print_json(names)
         return
     for item in names:
-        console(json).print(f"{item}: {load_robot(item).title}", highlight=False)
+        console(json).print(f"{item}: {load_robot(item).title}")
 
 
 @app.command()
@@ -53,8 +54,8 @@ def inspect(
 ) -> None:
     """Show joints, frames, wire and spots of a robot (which checks all its files), and what is doubtful in them."""
     import numpy as np
-    from rich.table import Table
 
+    from qpsafe.cli.sheet import Sheet
     from qpsafe.danger.thresholds import robot_thresholds
     from qpsafe.sensing.spots import load_spots
 
@@ -86,29 +87,32 @@ def inspect(
             }
         )
         return
-    table = Table(title=f"{robot.title}: joints")
-    for heading in ("joint", "lower [deg]", "upper [deg]", "speed [deg/s]", "acceleration [deg/s²]", "home [deg]"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    headings = ("joint", "lower [deg]", "upper [deg]", "speed [deg/s]", "acceleration [deg/s²]", "home [deg]")
+    sheet = Sheet(f"{robot.title}: joints", headings)
     columns = (robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, robot.home)
     for i, joint in enumerate(robot.joint_names):
-        table.add_row(joint, *(f"{np.rad2deg(column[i]):.1f}" for column in columns))
-    screen.print(table)
-    screen.print("frames: " + ", ".join(robot.frame_names), highlight=False)
-    screen.print("wire:   " + ", ".join(f"{a}-{b}" for a, b in robot.wire_frames), highlight=False)
+        sheet.add_row(joint, *(f"{np.rad2deg(column[i]):.1f}" for column in columns))
+    screen.print(sheet)
+    screen.print("frames: " + ", ".join(robot.frame_names))
+    screen.print("wire:   " + ", ".join(f"{a}-{b}" for a, b in robot.wire_frames))
     if spots is not None:
         ranges = f"range {spots.range_min.min()} to {spots.range_max.max()} m"
         screen.print(f"spots:  {len(spots)}, {ranges}: {', '.join(spots.names)}")
-    screen.print("tools:  " + ", ".join(robot.tool_frames), highlight=False)
-    screen.print(f"danger: Δ = {high.delta:g}, Δ_f = {low.delta:g}", highlight=False)
+    screen.print("tools:  " + ", ".join(robot.tool_frames))
+    screen.print(f"danger: Δ = {high.delta:g}, Δ_f = {low.delta:g}")
     for note in robot.notes:
-        screen.print(f"note:   {note}", style="yellow", highlight=False)
+        screen.print(f"note:   {note}", style="yellow")
 
 
 @app.command()
 def add(
     file: Annotated[str, typer.Argument(help="An MJCF or URDF file, or PACKAGE:MODEL.")],
-    out: Annotated[Path | None, typer.Option(help="Folder of the robot.toml; by default the model file's.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the robot.toml; by default the model file's.", callback=output_folder),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write over a robot.toml that is there.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")] = False,
 ) -> None:
     """Write a first robot.toml for a model file: limits, wire and frames as found, with notes on what was assumed."""
     from qpsafe.errors import ConfigurationError
@@ -122,6 +126,7 @@ def add(
     path, part = folder / "robot.toml", folder / ".robot.toml.part"
     if path.exists() and not force:
         raise ConfigurationError("robots add", "robot.toml", str(path), "no such file yet; --force writes over it")
+    try_folder("qpsafe robots add", "FILE" if out is None else "--out", folder)
     folder.mkdir(parents=True, exist_ok=True)
     try:
         part.write_text(starting_robot_toml(robot, folder), encoding="utf-8")
@@ -131,14 +136,15 @@ def add(
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-    screen = console(False)
-    screen.print(f"written: {path}", highlight=False)
+    if json:
+        print_json({"file": str(path), "name": again.name, "joints": again.nq, "notes": robot.notes})
+        return
+    screen = console(json)
+    screen.print(f"written: {path}")
     for note in robot.notes:
-        screen.print(f"note: {note}", style="yellow", highlight=False)
-    screen.print(
-        f"{again.name}: {again.nq} joints, {len(again.wire_frames)} links, see `qpsafe robots {folder}`",
-        highlight=False,
-    )
+        screen.print(f"note: {note}", style="yellow")
+    size = f"{counted(again.nq, 'joint')}, {counted(len(again.wire_frames), 'link')}"
+    screen.print(f"{again.name}: {size}, see `qpsafe robots {folder}`")
 
 
 def _load(name: str) -> Robot:

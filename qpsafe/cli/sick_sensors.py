@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import SensorName, console, progress_bar, show_matrix
+from qpsafe.cli.common import SensorName, console, progress_bar, show_matrix, verdict
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,7 +34,7 @@ def sick_sensors(
     from qpsafe.sim.sick import run_matrix
 
     with progress_bar(screen) as progress:
-        task = progress.add_task(f"{moments} moments", total=None)
+        task = progress.add_task(counted(moments, "moment"), total=None)
         results = run_matrix(
             FixedExperiment(load_robot("irb140"), sensor=sensor.value),
             moments,
@@ -46,30 +47,26 @@ def sick_sensors(
 
 def show(results: list[Result], screen: Console) -> None:
     """Print the matrix."""
-    from rich import box
-    from rich.table import Table
+    from rich.text import Text
 
-    title = "Sick sensors in the first experiment, each case at every moment"
-    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in ("", "case and promised reaction"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("moments", "ticks", "contacts", "limits", "nearest, m"):
-        table.add_column(heading, justify="right")
+    from qpsafe.cli.sheet import Sheet
+
+    headings = ("", "case and promised reaction", "moments", "ticks", "contacts", "limits", "nearest, m")
+    sheet = Sheet("Sick sensors in the first experiment, each case at every moment", headings, text=(0, 1))
     for r in results:
         late = f" ({r.missing} missing)" if r.missing else ""
-        table.add_row(
-            "[green]kept[/]" if r.kept else "[red]NOT[/]",
-            f"{r.case}\n  [dim]{r.promise}[/]",
+        sheet.add_row(
+            Text("not tried", "yellow") if r.kept is None else verdict(r.kept, no="NOT"),
+            Text.assemble(r.case, "\n  ", (r.promise, "dim")),
             f"{r.applied}/{r.moments}",
-            f"{r.slowest}/{r.within}{late}",
+            f"{r.slowest}/{r.within}{late}" if r.applied else f"-/{r.within}",
             str(r.contacts),
             "kept" if r.passed <= 1e-9 else f"{r.passed:.1e}",
-            f"{r.nearest:.3f}\n[dim]{r.nearest_healthy:.3f}[/]",
+            Text.assemble(f"{r.nearest:.3f}\n", (f"{r.nearest_healthy:.3f}", "dim")),
         )
-    screen.print(table)
+    screen.print(sheet)
     screen.print(
         "moments: those where the case can show; ticks of 4 ms: slowest reaction and how many are promised; nearest: "
         "smallest distance to board or person with the fault, and without",
         style="dim",
-        highlight=False,
     )

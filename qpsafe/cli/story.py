@@ -8,11 +8,15 @@ from typing import Annotated
 import typer
 
 from qpsafe.cli.common import console, print_json
+from qpsafe.cli.outputs import DRAWN, output_file
 
 
 def story(
     file: Annotated[Path, typer.Argument(help="TOML file of who does what.")],
-    plot: Annotated[Path | None, typer.Option(help="Draw ways and footprints from above into this PNG file.")] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw ways and footprints from above into this PNG file.", callback=output_file(*DRAWN)),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the times as JSON to standard output.")] = False,
 ) -> None:
     """Check a story of people around the robot, and say when who does what.
@@ -35,12 +39,10 @@ def story(
         events = [{"time": time, "person": name, "event": event} for time, name, event in told.events]
         print_json({"duration": told.duration, "steps": rows, "events": events})
         return
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
-    table = Table(title=told.table.title or file.name)
-    for heading in ("who", "from [s]", "to [s]", "does"):
-        table.add_column(heading, justify="right" if "[s]" in heading else "left")
+    sheet = Sheet(told.table.title or file.name, ("who", "from [s]", "to [s]", "does"), text=(0, 3))
     for row in rows:
-        table.add_row(str(row["person"]), f"{row['from']:.2f}", f"{row['to']:.2f}", str(row["does"]))
-    screen.print(table)
-    screen.print(f"{told.duration:.2f} s" + (f"; drawn into {plot}" if plot else ""), highlight=False)
+        sheet.add_row(str(row["person"]), f"{row['from']:.2f}", f"{row['to']:.2f}", str(row["does"]))
+    screen.print(sheet)
+    screen.print(f"{told.duration:.2f} s" + (f"; drawn into {plot}" if plot else ""))

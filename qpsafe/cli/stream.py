@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json
+from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -77,7 +78,9 @@ def stream(
     watchdog: Annotated[
         float, typer.Option(min=0.0, max=10.0, help="Heartbeat's age at which it asks for a stop [s]; 0: none.")
     ] = 0.1,
-    log: Annotated[Path | None, typer.Option(help="Log of the references, .csv or .qpref.")] = None,
+    log: Annotated[
+        Path | None, typer.Option(help="Log of the references, .csv or .qpref.", callback=output_file(".csv", ".qpref"))
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """Stream joint references to an IRC5 at its own pace (250 Hz). Ctrl-C ramps out before leaving.

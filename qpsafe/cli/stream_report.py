@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.cli.stream_speaker import PERIOD, refused
+from qpsafe.words import counted, growth
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -72,39 +73,37 @@ def result_of(
 
 def show(result: dict[str, Any], screen: Console) -> None:
     """Print the report."""
-    from rich.table import Table
+    from qpsafe.cli.sheet import Sheet
 
     response = result["response"]
     screen.print()
     for words in result["troubles"]:
-        screen.print(words, style="red", markup=False, highlight=False)
+        screen.print(words, style="red")
     if not result["answered"]:
         came = result["refused"]
         words = f"the robot was never answered: {came}" if came else "the robot never spoke"
-        screen.print(words, style="yellow", markup=False, highlight=False)
+        screen.print(words, style="yellow")
         return
-    table = Table(title=f"{result['duration']:.1f} s, {result['packets']} packets of the robot")
-    for heading in ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"):
-        table.add_column(heading, justify="right")
+    title = f"{result['duration']:.1f} s, {counted(result['packets'], 'packet')} of the robot"
+    sheet = Sheet(title, ("in time", "missed", "share", "p50", "p99", "p99.9", "maximum"), text=())
     share = 100.0 * result["missed"] / max(result["packets"], 1)
     times = (f"{1e3 * response[key]:.3f} ms" for key in ("p50", "p99", "p99.9", "maximum"))
-    table.add_row(str(result["answered_in_time"]), str(result["missed"]), f"{share:.3f} %", *times)
-    screen.print(table)
+    sheet.add_row(str(result["answered_in_time"]), str(result["missed"]), f"{share:.3f} %", *times)
+    screen.print(sheet)
     for name, count in result["missed_parts"].items():
-        screen.print(f"  missed, {name}: {count}", highlight=False)
+        screen.print(f"  missed, {name}: {count}")
     clock = "arrival in the kernel" if result["stamped_by_kernel"] else "reading"
-    screen.print(f"response, from {clock} to the answer:", highlight=False)
+    screen.print(f"response, from {clock} to the answer:")
     total = max(sum(result["histogram"].values()), 1)
     for label, count in result["histogram"].items():
         bar = "#" * round(40 * count / total)
-        screen.print(f"  {label:>16s} {count:9d} {bar}", highlight=False)
+        screen.print(f"  {label:>16s} {count:9d} {bar}")
     memory = result["memory"]
     if memory["growth"] is not None:
-        grown = memory["growth"] / 1e6
-        screen.print(f"memory: {memory['steady'] / 1e6:.1f} MB, grown by {grown:.3f} MB since", highlight=False)
+        screen.print(f"memory: {memory['steady'] / 1e6:.1f} MB, {growth(memory['growth'])} since")
     for name, count in result["events"]["counts"].items():
-        screen.print(f"event {name}: {count}", markup=False, highlight=False)
+        screen.print(f"event {name}: {count}")
     if result["failure"]:
-        screen.print(f"the loop failed: {result['failure']}", style="red", markup=False)
+        screen.print(f"the loop failed: {result['failure']}", style="red")
     if not result["at_rest"]:
         screen.print("the stream fell silent before the robot was at rest", style="red")

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 from llvmlite import binding as llvm
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
 
@@ -41,33 +41,49 @@ if numba.version_info.short <= (0, 68):
 inline = numba.njit(no_cpython_wrapper=True, **_inner, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
-PATIENCE = 1.5  # seconds; loading everything from the cache takes less
+PATIENCE = 1.5  # seconds of compiling that pass without a word: one changed kernel takes less
 NOTICE = "qpsafe: compiling for this machine, once, takes about 15 s ..."
 
 
-class _Watch:
-    """How long compiling takes, and who is told."""
+class _Watch(event.Listener):
+    """How long compiling takes, and who is told. numba's event comes for what is not in its cache, so that loading,
+    which may be slow on a busy machine, is never called compiling.
+    """
 
     def __init__(self) -> None:
-        self.total, self.told = 0.0, False
+        self.compiling, self.begin, self.told = 0.0, 0.0, False
+        self.depth = 0  # a kernel's inner functions are compiled inside its own compilation
+        self.timer: Timer | None = None
 
     def tell(self) -> None:
         """Say, once, what is happening."""
         self.told = True
         print(NOTICE, file=sys.stderr, flush=True)
 
+    def on_start(self, _: event.Event) -> None:
+        """Tell if compiling will have taken longer than `PATIENCE`, what was compiled before included."""
+        self.depth += 1
+        if self.depth == 1 and not self.told:
+            self.begin, self.timer = perf_counter(), Timer(max(PATIENCE - self.compiling, 0.0), self.tell)
+            self.timer.daemon = True
+            self.timer.start()
+
+    def on_end(self, _: event.Event) -> None:
+        """Stop the clock."""
+        self.depth -= 1
+        if self.depth == 0 and self.timer is not None:
+            self.timer.cancel()
+            self.timer = None
+            self.compiling += perf_counter() - self.begin
+
     @contextmanager
     def over(self, kernel: str) -> Iterator[None]:
-        """Compile a kernel under watch; tell when loading all of them would have been over."""
-        begin, used, timer = perf_counter(), process_time(), Timer(max(PATIENCE - self.total, 0.0), self.tell)
-        timer.daemon = True
-        if not self.told:
-            timer.start()
+        """Make a kernel ready under watch."""
+        used = process_time()
         try:
-            yield
+            with event.install_listener("numba:compile", self):
+                yield
         finally:
-            timer.cancel()
-            self.total += perf_counter() - begin
             seconds[kernel] = process_time() - used
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.reference import JointReference, ServoGains
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ def _blocks(reference: JointReference, n: int) -> tuple[Array | None, ...]:
     gains = (None, None, None) if reference.gains is None else reference.gains
     blocks = (reference.q, reference.qd, reference.torque, *gains)
     if any(np.shape(block) != (n,) for block in blocks if block is not None) or reference.q is None:
-        raise ValueError(f"reference {reference.seq} is not one of {n} joints")
+        raise ValueError(f"reference {reference.seq} is not one of {counted(n, 'joint')}")
     return blocks
 
 

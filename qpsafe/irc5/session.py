@@ -16,6 +16,7 @@ from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -139,7 +140,7 @@ class EgmSession:
         packet = arrival.packet
         qd = np.zeros(self.n) if arrival.restarted else self._velocity(packet)
         self._before = packet
-        notes = [f"{missed} packets missed"] if missed else []
+        notes = [f"{counted(missed, 'packet')} missed"] if missed else []
 
         closed = self._closed(packet)
         if self._released and not self.qd.any():

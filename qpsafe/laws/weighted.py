@@ -12,6 +12,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
+from qpsafe.words import counted
 
 
 class WeightedLaw(Fixed):
@@ -47,7 +48,9 @@ class WeightedLaw(Fixed):
         n, count = len(problem.qd0), len(problem.tasks)
         weights = self.weights or tuple(self.ratio ** (count - k) for k in range(count + 1))
         if len(weights) != count + 1:
-            raise ConfigurationError("WeightedLaw", "weights", weights, f"{count + 1} of them for {count} tasks")
+            raise ConfigurationError(
+                "WeightedLaw", "weights", weights, f"{count + 1} of them for {counted(count, 'task')}"
+            )
         closing = math.sqrt(weights[-1])
         rows, targets = [closing * np.eye(n)], [closing * problem.qd0]
         for k, ((J, xd), a) in enumerate(zip(problem.tasks, problem.activations, strict=True)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -73,7 +73,12 @@ class Candidates:
 
 
 def candidate_nodes(
-    robot: Robot, wanted: int = SOURCE_NODES, *, spacing: float | None = None, sensor: Sensor | None = None
+    robot: Robot,
+    wanted: int = SOURCE_NODES,
+    *,
+    spacing: float | None = None,
+    sensor: Sensor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Candidates:
     """An equally spaced grid of nodes on the regions of the robot's surface, see `qpsafe.placement.grid`.
 
@@ -82,6 +87,7 @@ def candidate_nodes(
         wanted: Number of nodes; the spacing is searched that gives it, or the number nearest to it.
         spacing: Use this one instead [m].
         sensor: What is to be placed; by default the Sharp sensor from 20 to 80 cm.
+        progress: Called with the number of grids tried while the spacing is searched, and the last one's nodes.
 
     Raises:
         RobotFileError: The robot has no region, or nothing of the surface looks out freely in one.
@@ -100,7 +106,7 @@ def candidate_nodes(
     if spacing is None:
         # the area that looks out, by a coarse lattice, says what to expect
         area = sum(len(patch.fine[0]) for patch in patches) * COARSE**2
-        spacing = _spacing_for(patches, wanted, float(np.sqrt(area / wanted)))
+        spacing = _spacing_for(patches, wanted, float(np.sqrt(area / wanted)), progress)
     elif np.isfinite(spacing) and 1e-3 <= spacing <= 1.0:
         for patch in patches:
             patch.refine(spacing / FINE)
@@ -182,17 +188,27 @@ def _sides(directions: Array) -> list[str]:
     return [str(names[a, int(directions[a, i] > 0.0)]) for i, a in enumerate(axis)]
 
 
-def _spacing_for(patches: Sequence[_Patch], wanted: int, guess: float) -> float:
+def _spacing_for(
+    patches: Sequence[_Patch], wanted: int, guess: float, progress: Callable[[int, int], None] | None
+) -> float:
     """The spacing whose grid has the wanted number of nodes, or the number nearest to it.
 
     The number jumps: some are skipped. Then the search starts anew with gaps filled by another lattice, as fine as the
     last spacing suggests.
     """
+    tried = 0
+
+    def told(nodes: int) -> None:
+        nonlocal tried
+        tried += 1
+        if progress is not None:
+            progress(tried, nodes)
+
     best = (wanted + 1, guess, guess)  # how far off, spacing, and the guess that the fine lattice was laid with
     for _ in range(_PASSES):
         for patch in patches:
             patch.refine(guess / FINE)
-        counts = _search(patches, wanted, guess)
+        counts = _search(patches, wanted, guess, told)
         spacing = min(counts, key=lambda spacing: (abs(counts[spacing] - wanted), spacing))
         best = min(best, (abs(counts[spacing] - wanted), spacing, guess))
         if best[0] == 0 or spacing == guess:
@@ -205,13 +221,14 @@ def _spacing_for(patches: Sequence[_Patch], wanted: int, guess: float) -> float:
     return spacing
 
 
-def _search(patches: Sequence[_Patch], wanted: int, guess: float) -> dict[float, int]:
+def _search(patches: Sequence[_Patch], wanted: int, guess: float, told: Callable[[int], None]) -> dict[float, int]:
     """Numbers of nodes by spacing, around the wanted one if it can be had."""
     counts: dict[float, int] = {}
 
     def count(spacing: float) -> int:
         if spacing not in counts:
             counts[spacing] = sum(len(patch.grid(spacing)[0]) for patch in patches)
+            told(counts[spacing])
         return counts[spacing]
 
     spacing = guess

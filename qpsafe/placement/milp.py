@@ -26,6 +26,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.placement.coverage import Caps, Worth, detected_pairs, greedy, progress_of
 from qpsafe.placement.knapsack import check_spots
 from qpsafe.placement.sample import Sample
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,8 @@ def least_spots(sample: Sample, probability: float, *, time_limit: float = 30.0,
     reached = np.flatnonzero(first.value >= needed - 0.5)
     if not len(reached):
         share = first.value[-1] / sample.pairs
-        expected = f"at most {share:.4f}, what all {sample.nodes} nodes together detect of {sample.pairs} pairs"
+        nodes, pairs = counted(sample.nodes, "node"), counted(sample.pairs, "pair")
+        expected = f"at most {share:.4f}, what all {nodes} together detect of {pairs}"
         raise ConfigurationError("placement", "probability", probability, expected)
     count = int(reached[0])
     bound = int(np.flatnonzero(first.bound >= needed - 0.5)[0])

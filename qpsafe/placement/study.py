@@ -16,6 +16,7 @@ from qpsafe.placement.milp import Solution, best_choice, least_spots
 from qpsafe.placement.objective import Objective
 from qpsafe.placement.sample import Sample
 from qpsafe.placement.statistics import clopper_pearson
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -144,7 +145,7 @@ def study(
     solutions = {"cost": Solution(best, value, value, "sorting", 0.0)}
     for name, worth in worths.items():
         asked = name == objective.value and probability is None
-        say(f"{spots} spots, {name}")
+        say(f"{counted(spots, 'spot')}, {name}")
         solutions[name] = best_choice(first, spots, worth, caps, time_limit=time_limit, exact=exact and asked)
     if probability is not None:
         say("least spots")

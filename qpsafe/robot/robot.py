@@ -15,6 +15,7 @@ from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.spec import Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.words import counted
 
 _FLOAT = np.dtype(np.float64)
 
@@ -103,7 +104,8 @@ class Robot(Fixed):
         }
 
     def __repr__(self) -> str:
-        return f"Robot({self.name!r}, {self.nq} joints, {len(self.wire_frames)} wire links, {self.model_path.name})"
+        size = f"{counted(self.nq, 'joint')}, {counted(len(self.wire_frames), 'wire link')}"
+        return f"Robot({self.name!r}, {size}, {self.model_path.name})"
 
     def with_spots(self, file: str | Path | None) -> Robot:
         """The same robot with the distance sensors of another file.

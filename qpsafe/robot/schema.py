@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from qpsafe.errors import RobotFileError
+from qpsafe.words import counted
 
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
@@ -204,7 +205,7 @@ def check(path: Path, file: RobotFile) -> None:
         if len(table.rows) != len(joints):
             raise RobotFileError(path, f"{key}.rows", f"{len(table.rows)} rows", f"{len(joints)} rows, one a joint")
         if len(table.frames) != len(table.rows) + 1:
-            expected = f"{len(table.rows) + 1} frames: the base's and one a joint"
+            expected = f"{counted(len(table.rows) + 1, 'frame')}: the base's and one a joint"
             raise RobotFileError(path, f"{key}.frames", table.frames, expected)
         _known_frames(path, f"{key}.frames", table.frames, file.frames)
     danger = file.danger

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.sensing.sharp import SharpConverter, SharpCurve
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -83,8 +84,8 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
     ignored = int((~inside).sum())
     d, v = d[inside], v[inside]
     if len(d) < FEWEST or len(np.unique(d)) < 4:
-        found = f"{len(d)} pairs at {len(np.unique(d))} distances"
-        expected = f"at least {FEWEST} pairs at 4 distances between {FITTED[0]} and {FITTED[1]} m"
+        found = f"{counted(len(d), 'pair')} at {counted(len(np.unique(d)), 'distance')}"
+        expected = f"at least {counted(FEWEST, 'pair')} at 4 distances between {FITTED[0]} and {FITTED[1]} m"
         raise ConfigurationError(where, "pairs", found, expected)
     start = SharpCurve()
     slope = start.gain / (d + start.offset) ** 2  # |dV/dd|: volts per metre

@@ -18,6 +18,7 @@ from qpsafe.sensing.kernel import take_readings
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.sensing.velocity import ApproachVelocity
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -190,5 +191,5 @@ class DistanceSensing(Fixed):
         notes = [f"spots {what}, unseen what is before them: {', '.join(who)}" for what, who in kinds.items()]
         if health.too_many:
             more = "stopped until acknowledged" if health.stopped else "stopped until they see again"
-            notes.insert(0, f"more than {health.most} of {len(names)} spots are out of order: {more}")
+            notes.insert(0, f"more than {health.most} of {counted(len(names), 'spot')} are out of order: {more}")
         return tuple(notes)

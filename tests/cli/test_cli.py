@@ -140,7 +140,7 @@ def test_unknown_robot_is_one_line_and_exit_code_1() -> None:
 
 @pytest.mark.slow
 def test_bench_compiles_every_kernel_and_finds_it_in_the_cache(tmp_path: Path) -> None:
-    result = run(app, ["bench", "--compile", "--json", str(tmp_path / "bench.json")])
+    result = run(app, ["bench", "--compile", "--out", str(tmp_path / "bench.json")])
     assert result.exit_code == 0
     first, later = json.loads((tmp_path / "bench.json").read_text())["results"].values()
     assert first["kernels"].keys() == later["kernels"].keys() >= {"qpsafe.hqp.own_hierarchy.run"}
@@ -148,8 +148,9 @@ def test_bench_compiles_every_kernel_and_finds_it_in_the_cache(tmp_path: Path) -
 
 
 def test_bench_writes_its_figures(tmp_path: Path) -> None:
-    result = run(app, ["bench", "--ticks", "100", "--json", str(tmp_path / "bench.json")])
+    result = run(app, ["bench", "--ticks", "100", "--json", "--out", str(tmp_path / "bench.json")])
     assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout) == json.loads((tmp_path / "bench.json").read_text())
     content = json.loads((tmp_path / "bench.json").read_text())
     for times in content["results"].values():
         assert 0.0 < times["median"] <= times["p99"] <= times["p999"] <= times["maximum"]

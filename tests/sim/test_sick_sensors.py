@@ -1,14 +1,16 @@
 """Every sick-sensor case in closed loop: a small version here, the whole matrix when there is time."""
 
+import json
 import math
 
 import pytest
+import typer
 
 import qpsafe
 from qpsafe.sim.choreography import Approach, Choreography
 from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.loop import FixedLoop
-from qpsafe.sim.sick import run_matrix
+from qpsafe.sim.sick import Result, run_matrix
 from qpsafe.sim.sick_cases import CASES
 
 ROBOT = qpsafe.load_robot("irb140")
@@ -32,11 +34,30 @@ def test_a_copy_goes_on_as_the_run_does_bit_by_bit():
             twin.advance()
 
 
+@pytest.mark.parametrize("wrong", [{"contacts": 1}, {"passed": 1e-3}])
+def test_a_case_that_could_show_at_no_moment_is_not_kept_nor_excused(wrong, capsys):
+    """Nothing was tried, so nothing was kept; a contact or a limit passed counts all the same."""
+    from qpsafe.cli.common import console, show_matrix
+    from qpsafe.cli.sick_sensors import show
+
+    untried = Result("stuck", "reported", 1, 1, 0, 0, 0, 0, 0.0, 0.2, 0.2)
+    broken = untried._replace(**wrong)
+    assert untried.kept is None
+    assert broken.kept is False
+    show_matrix([untried], show, console(False), as_json=False)
+    assert "not tried" in capsys.readouterr().out
+    show_matrix([untried], show, console(True), as_json=True)
+    assert json.loads(capsys.readouterr().out)["cases"][0]["kept"] is None
+    with pytest.raises(typer.Exit):
+        show_matrix([untried, broken], show, console(False), as_json=False)
+    assert "NOT" in capsys.readouterr().out
+
+
 def test_every_case_reacts_as_promised():
     results = run_matrix(FixedExperiment(ROBOT, choreography=BRIEF, duration=9.0), count=2, seed=1, jobs=1)
     assert [result.case for result in results] == [case.name for case in CASES]
     for result in results:
-        assert result.kept, result
+        assert result.kept is (True if result.applied else None), result
     assert sum(result.applied for result in results) > len(results)
 
 

@@ -1,0 +1,83 @@
+"""Where results go: every output path is tried before the work starts, and named if nothing can be written there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+import typer
+
+from qpsafe.errors import ConfigurationError
+
+DRAWN = (".png", ".pdf", ".svg")
+"""Endings of figures."""
+
+
+def output_folder(context: typer.Context, param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Callback of an option: a folder that results can be written into, made later if it is not there."""
+    if value is not None and not context.resilient_parsing:
+        try_folder(context.command_path, param.opts[0], value)
+    return value
+
+
+def output_file(*suffixes: str) -> Callable[[typer.Context, typer.CallbackParam, Path | None], Path | None]:
+    """Make a callback of an option: a file that can be written, with one of these endings if any are given."""
+
+    def callback(context: typer.Context, param: typer.CallbackParam, value: Path | None) -> Path | None:
+        if value is not None and not context.resilient_parsing:
+            try_file(context.command_path, param.opts[0], value, *suffixes)
+        return value
+
+    return callback
+
+
+def try_folder(where: str, key: str, path: Path) -> None:
+    """Write something into a folder and leave no trace; folders that are not there are made and removed again.
+
+    Raises:
+        ConfigurationError: It cannot be made, or nothing can be written into it.
+    """
+    made: list[Path] = []
+    try:
+        for folder in (*reversed(path.parents), path):
+            if not folder.exists():
+                folder.mkdir()
+                made.append(folder)
+        with NamedTemporaryFile(dir=path, prefix=".qpsafe-"):
+            pass
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(where, key, str(path), f"a folder to write into ({_reason(error)})") from None
+    finally:
+        with suppress(OSError):  # somebody else has put something there meanwhile
+            for folder in reversed(made):
+                folder.rmdir()
+
+
+def try_file(where: str, key: str, path: Path, *suffixes: str) -> None:
+    """Write beside a file, as its own writer will before it takes its place, and leave no trace.
+
+    Raises:
+        ConfigurationError: It is a folder or a device, its folder is not there, nothing can be written there, or it
+            has another ending.
+    """
+    try:
+        if suffixes and path.suffix.lower() not in suffixes:
+            raise ConfigurationError(where, key, str(path), "a file that ends in " + " or ".join(suffixes))
+        if path.exists() and not path.is_file():
+            raise ConfigurationError(where, key, str(path), "a file, or a name for a new one")
+        if not path.parent.is_dir():
+            raise ConfigurationError(where, key, str(path), "a file in a folder that is there")
+        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+            pass
+    except OSError as error:
+        raise ConfigurationError(where, key, str(path), f"a file that can be written ({_reason(error)})") from None
+    except ValueError as error:
+        if isinstance(error, ConfigurationError):
+            raise
+        raise ConfigurationError(where, key, str(path), f"a file that can be written ({error})") from None
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
