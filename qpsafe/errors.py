@@ -7,6 +7,9 @@ and what was expected.
 
 from __future__ import annotations
 
+#: Characters of a value in a message.
+_LONGEST = 400
+
 
 class QpsafeError(Exception):
     """Base class of every error that qpsafe raises on purpose."""
@@ -27,7 +30,16 @@ class ConfigurationError(QpsafeError, ValueError):
         self.key = key
         self.value = value
         self.expected = expected
-        super().__init__(f"{self.where}: {key} = {value!r}: expected {expected}")
+        super().__init__(f"{self.where}: {key} = {_shown(value)}: expected {expected}")
+
+
+def _shown(value: object) -> str:
+    """A value for a message, cut short; whatever it is, an error about it can be raised."""
+    try:
+        text = repr(value)
+    except Exception:  # nested too deep, a number of too many digits, a stranger's __repr__
+        text = f"<{type(value).__name__} that cannot be shown>"
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
 
 
 class RobotFileError(ConfigurationError):

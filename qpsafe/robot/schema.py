@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from qpsafe.errors import RobotFileError
+from qpsafe.tasks.toml_parse import read_bounded, toml_table
 
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
@@ -158,11 +159,11 @@ def read_robot_file(path: Path) -> RobotFile:
         RobotFileError: The file is missing, is no TOML, or a value in it is wrong.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_bounded(path)
+    except (OSError, ValueError) as error:
         raise RobotFileError(path, "file", path.name, f"a readable UTF-8 file ({error})") from error
     try:
-        raw = tomllib.loads(text)
+        raw = toml_table(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(path, text, error) from error
     try:
