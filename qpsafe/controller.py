@@ -30,6 +30,7 @@ from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sensing.units import UnitWatch
 from qpsafe.speed_cap import slowed
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
@@ -97,6 +98,7 @@ class SafetyController:
         self.spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
         self.rules = SensingRules() if sensing is None else sensing
         self.sensing = DistanceSensing(robot, self.spots, self.dt, self.rules, known, carried) if self.spots else None
+        self._units = UnitWatch(self.spots, self.dt)
         self.barrier = barrier
         self.recovery_rules = RecoveryRules() if recovery is None else recovery
         self._quick, self._gentle = Quick(robot), GentleLimits(self.recovery_rules.acceleration)
@@ -108,6 +110,7 @@ class SafetyController:
         self.evasion.reset()
         if self.sensing is not None:
             self.sensing.reset()
+        self._units.reset()
         self._seq = -1
         self._active = False
         self._q = self.robot.home.copy()
@@ -127,6 +130,7 @@ class SafetyController:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
         if self.sensing is not None:
             self.sensing.acknowledge()
+        self._units.acknowledge()
 
     def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
         """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
@@ -242,7 +246,7 @@ class SafetyController:
         # integrate -> joint reference, now that nothing of the user's can fail any more
         path_time = self.recovery.path_time
         off_path = None if self.recovery.on_path else partial(_errors, self.tasks, commanded, path_time)
-        messages = (*messages, *seen.notes)
+        messages = (*messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._advance(command),
             cdf_n=cdf_n,

@@ -83,8 +83,8 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
         yield progress
 
 
-def show_checks(title: str, checks: Sequence[Check], screen: Console) -> None:
-    """Print what was measured beside what was promised."""
+def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: Sequence[str] = ()) -> None:
+    """Print what was measured beside what was promised, and which promises the run could neither keep nor break."""
     from rich.table import Table
 
     table = Table(title=title)
@@ -94,6 +94,10 @@ def show_checks(title: str, checks: Sequence[Check], screen: Console) -> None:
         mark = "[green]kept[/]" if check.kept else "[red]NOT kept[/]"
         table.add_row(mark, check.name, check.measured, check.promised)
     screen.print(table)
+    if left_out:
+        screen.print("left out, since nothing of the kind happened in so short a run:", style="yellow")
+        for name in left_out:
+            screen.print(f"  {name}", markup=False, highlight=False)
 
 
 def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], screen: Console, as_json: bool) -> None:

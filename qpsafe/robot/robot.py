@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -106,7 +107,7 @@ class Robot:
             file: A name in the robot's folder, or a path. Read, and checked, when its spots are loaded.
         """
         other, own = copy(self), self.folder / file
-        other.spots_path = own if own.is_file() else Path(file)
+        other.spots_path = own if os.path.isfile(own) else Path(file)
         return other
 
     def at(self, q: ArrayLike) -> RobotState:

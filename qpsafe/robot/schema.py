@@ -8,6 +8,7 @@ names the file, the key and the value.
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -231,7 +232,7 @@ def _check_region(path: Path, key: str, region: RegionTable, file: RobotFile) ->
     for low, high in zip(region.lower, region.upper, strict=True):
         if not low < high:
             raise RobotFileError(path, f"{key}.lower", region.lower, f"below upper = {region.upper} on each axis")
-    if region.mesh is not None and not (path.parent / region.mesh).is_file():
+    if region.mesh is not None and not os.path.isfile(path.parent / region.mesh):
         raise RobotFileError(path, f"{key}.mesh", region.mesh, "a mesh file in the same folder")
 
 
