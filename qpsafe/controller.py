@@ -41,6 +41,7 @@ from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sensing.units import UnitWatch
 from qpsafe.speed_cap import slowed
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
@@ -108,6 +109,7 @@ class SafetyController(Parts):
         self._sensing: DistanceSensing | None = None
         if self._spots is not None:
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
+        self._units = UnitWatch(self._spots, self._dt)
         self.barrier = barrier
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._quick, self._gentle = Quick(robot), GentleLimits(self._recovery_rules.acceleration)
@@ -119,6 +121,7 @@ class SafetyController(Parts):
         self._evasion.reset()
         if self._sensing is not None:
             self._sensing.reset()
+        self._units.reset()
         self._seq = -1
         self._active = False
         self._q = self._robot.home
@@ -138,6 +141,7 @@ class SafetyController(Parts):
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
         if self._sensing is not None:
             self._sensing.acknowledge()
+        self._units.acknowledge()
 
     def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
         """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
@@ -257,7 +261,7 @@ class SafetyController(Parts):
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
-        messages = (*messages, *seen.notes)
+        messages = (*messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
             cdf_n=cdf_n,

@@ -8,6 +8,7 @@ and what was expected.
 from __future__ import annotations
 
 _LONGEST = 1000  # letters of a message in the loop
+_LONGEST_VALUE = 400  # of a value in it
 
 
 class QpsafeError(Exception):
@@ -55,7 +56,13 @@ class ConfigurationError(QpsafeError, ValueError):
         self.key = key
         self.value = value
         self.expected = expected
-        super().__init__(f"{self.where}: {key} = {represented(value)}: expected {expected}")
+        super().__init__(f"{self.where}: {key} = {_shown(value)}: expected {expected}")
+
+
+def _shown(value: object) -> str:
+    """A value for a message, cut short."""
+    text = represented(value)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
 
 
 class RobotFileError(ConfigurationError):

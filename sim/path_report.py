@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from qpsafe.recovery import FOLLOWING
 from qpsafe.sim.path import PathRun
-from qpsafe.sim.report import Check
+from qpsafe.sim.report import Check, split
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -24,7 +24,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class PathFigures:
-    """Figures of one run; NaN where it has no such moments.
+    """Figures of one run; None where it has no such moments.
 
     Attributes:
         line_orientation, line_position: Largest errors on the line at constant speed, in low danger, settled [rad, m].
@@ -32,23 +32,23 @@ class PathFigures:
         step: Largest change of q̇ in a tick, in units of a_max dt.
         clipped: Ticks in which the law's answer passed a limit and was clipped.
         return_speed, return_acceleration: Largest ones while returning to the path after high danger, in units of the
-            limits.
+            limits; a return that the run cuts off within `CALM` is left out.
         smooth_speed, smooth_acceleration: The same once the evasive motion has been braked, 0.5 s after danger fell.
         resumed: Largest distance of the tool from the point where the path had stopped when it went on [m].
         suspensions: How often the path was suspended.
         travelled: How far the path's clock came [s].
     """
 
-    line_orientation: float
-    line_position: float
-    medium_position: float
+    line_orientation: float | None
+    line_position: float | None
+    medium_position: float | None
     step: float
     clipped: int
-    return_speed: float
-    return_acceleration: float
-    smooth_speed: float
-    smooth_acceleration: float
-    resumed: float
+    return_speed: float | None
+    return_acceleration: float | None
+    smooth_speed: float | None
+    smooth_acceleration: float | None
+    resumed: float | None
     suspensions: int
     travelled: float
 
@@ -61,7 +61,7 @@ def figures(run: PathRun, robot: Robot) -> PathFigures:
     qd = log.qd_ref
     rise = np.abs(np.diff(qd, axis=0, prepend=qd[:1])) / (robot.max_acceleration * dt)
     step, speed = rise.max(axis=1), (np.abs(qd) / robot.max_velocity).max(axis=1)
-    back, starts = returning(run), _starts(log.regime == "high", falling=True)
+    back, starts = _whole(returning(run), round(CALM / dt)), _starts(log.regime == "high", falling=True)
     braked = back & ~_after(starts, round(SETTLED / dt), len(back))
     went_on = _starts(log.phase == FOLLOWING) if (log.phase != FOLLOWING).any() else np.zeros(0, dtype=int)
     return PathFigures(
@@ -74,7 +74,7 @@ def figures(run: PathRun, robot: Robot) -> PathFigures:
         _largest(step, back),
         _largest(speed, braked),
         _largest(step, braked),
-        float(position[went_on].max()) if len(went_on) else float("nan"),
+        float(position[went_on].max()) if len(went_on) else None,
         len(_starts(log.phase == "suspended")),
         float(run.path_time[-1]),
     )
@@ -103,55 +103,64 @@ def returning(run: PathRun) -> Flags:
     return back
 
 
-def promises(strict: PathFigures, without: PathFigures | None, others: Mapping[str, PathFigures]) -> list[Check]:
+def promises(
+    strict: PathFigures, without: PathFigures | None, others: Mapping[str, PathFigures]
+) -> tuple[list[Check], list[str]]:
     """What the second experiment is to show.
 
     Args:
         strict: The hierarchical law with the strict projection.
         without: The same run without suspension and recovery.
         others: The other laws by name; the null-space law as ``nullspace``.
+
+    Returns:
+        The promises, and the names of those that the runs can neither keep nor break, for want of such moments.
     """
-    checks = [
+    found = [
         _bound("strict: orientation error, low danger, constant speed", strict.line_orientation, 1e-3, "rad"),
-        _bound("strict: position error in medium danger along the line", 1e3 * strict.medium_position, 2.0, "mm"),
-        _bound("strict: the path goes on from where it stopped", 1e3 * strict.resumed, 1.0, "mm"),
+        _bound("strict: position error in medium danger along the line", strict.medium_position, 2e-3, "m"),
+        _bound("strict: the path goes on from where it stopped", strict.resumed, 1e-3, "m"),
     ]
     if "nullspace" in others:
-        error = others["nullspace"].line_orientation
-        name = "null-space law: the same orientation error"
-        checks.insert(1, Check(name, f"{error:.3g} rad", "> 1e-3 rad, as the source reports", bool(error > 1e-3)))
+        error, name = others["nullspace"].line_orientation, "null-space law: the same orientation error"
+        promised = "> 1e-3 rad, as the source reports"
+        found.insert(1, name if error is None else Check(name, f"{error:.3g} rad", promised, bool(error > 1e-3)))
     for name, run in {"strict": strict, **others}.items():
-        value = run.step - 1.0
-        checks.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", value, 1e-9, "a_max dt"))
+        found.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", run.step - 1.0, 1e-9, "a_max dt"))
     if without is not None:
         kinds = {
             "joint speed": (strict.return_speed, without.return_speed),
             "joint acceleration": (strict.return_acceleration, without.return_acceleration),
             "joint acceleration, evasion braked": (strict.smooth_acceleration, without.smooth_acceleration),
         }
-        for name, (with_it, without_it) in kinds.items():
+        for kind, (with_it, without_it) in kinds.items():
+            name = f"strict: {kind} on the way back"
+            if with_it is None or without_it is None:
+                found.append(name)
+                continue
             kept = bool(with_it < without_it and with_it <= 1.0 + 1e-9)
             promised = f"< {without_it:.3f} without recovery, and <= 1"
-            checks.append(Check(f"strict: {name} on the way back", f"{with_it:.3f} of the limit", promised, kept))
-    return checks
+            found.append(Check(name, f"{with_it:.3f} of the limit", promised, kept))
+    return split(found)
 
 
-def to_dict(found: Mapping[str, PathFigures], checks: list[Check]) -> dict[str, Any]:
+def to_dict(found: Mapping[str, PathFigures], checks: list[Check], left_out: Sequence[str]) -> dict[str, Any]:
     """For JSON."""
     return {
         "laws": {name: {key: _or_none(value) for key, value in asdict(item).items()} for name, item in found.items()},
         "checks": [check._asdict() for check in checks],
+        "left_out": list(left_out),
         "kept": all(check.kept for check in checks),
     }
 
 
-def _or_none(value: float) -> float | None:
+def _or_none(value: float | None) -> float | None:
     """JSON has no NaN."""
-    return None if math.isnan(value) else value
+    return None if value is None or math.isnan(value) else value
 
 
-def _largest(values: NDArray[np.float64], where: Flags) -> float:
-    return float(values[where].max()) if where.any() else float("nan")
+def _largest(values: NDArray[np.float64], where: Flags) -> float | None:
+    return float(values[where].max()) if where.any() else None
 
 
 def _starts(flags: Flags, falling: bool = False) -> NDArray[np.intp]:
@@ -168,6 +177,15 @@ def _lasting(flags: Flags, count: int) -> Flags:
     return whole
 
 
+def _whole(flags: Flags, count: int) -> Flags:
+    """Without the last stretch, if the run's end cuts it off before `count` ticks: its peak may not have come yet."""
+    whole, down = flags.copy(), np.flatnonzero(~flags)
+    last = down[-1] + 1 if len(down) else 0
+    if len(flags) - last < count:
+        whole[last:] = False
+    return whole
+
+
 def _after(starts: NDArray[np.intp], count: int, n: int) -> Flags:
     flags = np.zeros(n, dtype=bool)
     for start in starts:
@@ -175,5 +193,9 @@ def _after(starts: NDArray[np.intp], count: int, n: int) -> Flags:
     return flags
 
 
-def _bound(name: str, value: float, bound: float, unit: str) -> Check:
-    return Check(name, f"{value:.3g} {unit}", f"< {bound:g} {unit}", bool(value < bound))
+def _bound(name: str, value: float | None, bound: float, unit: str) -> Check | str:
+    """A promise about a figure; lengths are shown in mm."""
+    if value is None:
+        return name
+    size, shown = (1e3, "mm") if unit == "m" else (1.0, unit)
+    return Check(name, f"{size * value:.3g} {shown}", f"< {size * bound:g} {shown}", bool(value < bound))

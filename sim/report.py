@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +15,7 @@ from qpsafe.sim.log import RunLog
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
+Array = NDArray[np.float64]
 Window = tuple[float, float]
 LIMIT_TOLERANCE = 1e-9
 
@@ -49,6 +51,11 @@ class Check(NamedTuple):
     kept: bool
 
 
+def split(found: Sequence[Check | str]) -> tuple[list[Check], list[str]]:
+    """Promises that could be judged, and the names of those that could not."""
+    return [item for item in found if isinstance(item, Check)], [item for item in found if isinstance(item, str)]
+
+
 @dataclass(frozen=True)
 class Report:
     """Summary of a run.
@@ -56,7 +63,8 @@ class Report:
     Attributes:
         regimes: Every stretch in one regime.
         approaches: Every approach that was complete.
-        checks: The promises.
+        checks: The promises that the run could keep or break.
+        left_out: Names of those that it could not: what they are about did not happen, as in a short run.
         tracking: Largest position (3D) and orientation difference of commanded and measured tool pose [m, rad].
         unusual: How many ticks had a message, and the most frequent one.
     """
@@ -64,6 +72,7 @@ class Report:
     regimes: list[RegimeRow]
     approaches: list[ApproachRow]
     checks: list[Check]
+    left_out: list[str]
     tracking: tuple[float, float]
     unusual: tuple[int, str]
 
@@ -86,17 +95,20 @@ def summarise(log: RunLog, without: NDArray[np.float64], windows: tuple[Window, 
     Args:
         log: The run.
         without: Distance robot-board at every tick if the robot keeps its pose (N,) [m].
-        windows: Start and end of each complete approach [s].
+        windows: Start and end of each approach; what is about one that the run does not complete is left out [s].
         robot: For its limits.
     """
-    checks = [*_order(log, windows), *_errors(log, windows), *_limits(log, robot)]
+    found: list[Check | str] = [*_order(log, windows), *_errors(log, windows), *_limits(log, robot)]
     approaches = []
     for start, end in windows:
+        if not _complete(log, end):
+            found.append(f"distance to the board, approach at {start:.1f} s")
+            continue
         inside = _between(log, start, end)
         approaches.append(
             ApproachRow(start, end, float(log.board_distance[inside].min()), float(without[inside].min()))
         )
-    checks.extend(
+    found.extend(
         Check(
             f"distance to the board, approach at {row.start:.1f} s",
             f"{row.with_controller:.3f} m",
@@ -111,7 +123,8 @@ def summarise(log: RunLog, without: NDArray[np.float64], windows: tuple[Window, 
         float(np.linalg.norm(log.position_error - log.measured_position_error, axis=1).max()),
         float(np.linalg.norm(log.orientation_error - log.measured_orientation_error, axis=1).max()),
     )
-    return Report(_regimes(log), approaches, checks, tracking, (len({tick for tick, _ in log.messages}), frequent))
+    unusual = (len({tick for tick, _ in log.messages}), frequent)
+    return Report(_regimes(log), approaches, *split(found), tracking, unusual)
 
 
 def _regimes(log: RunLog) -> list[RegimeRow]:
@@ -131,54 +144,61 @@ def _regimes(log: RunLog) -> list[RegimeRow]:
     return rows
 
 
-def _order(log: RunLog, windows: tuple[Window, ...]) -> list[Check]:
+def _complete(log: RunLog, end: float) -> bool:
+    """Whether the run lasted to this time [s]."""
+    return end <= log.time[-1] + log.dt + 1e-9
+
+
+def _order(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
     """Table I: levels are entered and left one after the other, and every approach reaches high danger."""
     level = {"low": 0, "medium": 1, "high": 2}
-    checks = []
+    checks: list[Check | str] = []
     for start, end in windows:
+        name = f"order of Table I, approach at {start:.1f} s"
+        if not _complete(log, end):
+            checks.append(name)
+            continue
         inside = _between(log, start, end)
         names = [item.name for item in log.intervals() if item.end > start and item.start < end]
-        levels = [level.get(name, 9) for name in names]
+        levels = [level.get(word, 9) for word in names]
         steps = {abs(b - a) for a, b in pairwise(levels)}
         good = steps == {1} and levels[0] == levels[-1] == 0 and 2 in levels
-        reached = f"CDF_n up to {log.cdf_n[inside].max():.2f}"
-        checks.append(
-            Check(
-                f"order of Table I, approach at {start:.1f} s",
-                " ".join(names) + f" ({reached})",
-                "low, medium, high and back, one at a time",
-                good,
-            )
-        )
+        measured = " ".join(names) + f" (CDF_n up to {log.cdf_n[inside].max():.2f})"
+        checks.append(Check(name, measured, "low, medium, high and back, one at a time", good))
     return checks
 
 
-def _errors(log: RunLog, windows: tuple[Window, ...]) -> list[Check]:
+def _errors(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
     position, orientation = _norm(log.position_error), _norm(log.orientation_error)
-    checks = []
     seen = np.flatnonzero(np.isfinite(log.distances).any(axis=1))
     quiet = slice(0, seen[0] if len(seen) else len(log.time))
-    if position[quiet].size:
-        p, o = position[quiet].max(), orientation[quiet].max()
-        checks.append(_bound("position error before anything is detected", 1e3 * p, 0.1, "mm"))
-        checks.append(_bound("orientation error before anything is detected", o, 0.001, "rad"))
+    checks = _pair("before anything is detected", position[quiet], orientation[quiet], (0.1, 0.001))
     for start, end in windows:
         inside = np.flatnonzero(_between(log, start, end))
         high = inside[log.regime[inside] == "high"]
-        medium = inside[(log.regime[inside] == "medium") & (inside < (high[0] if len(high) else inside[-1] + 1))]
-        if len(medium):
-            name = f"in medium before high, approach at {start:.1f} s"
-            checks.append(_bound("position error " + name, 1e3 * position[medium].max(), 2.0, "mm"))
-            peak = orientation[medium].max()
-            checks.append(Check("orientation error " + name, f"{peak:.3f} rad", "> 0.05 rad", bool(peak > 0.05)))
+        medium = inside[(log.regime[inside] == "medium") & (inside < (high[0] if len(high) else len(log.time)))]
+        name = f"in medium before high, approach at {start:.1f} s"
+        if not (len(medium) and _complete(log, end)):
+            checks += ["position error " + name, "orientation error " + name]
+            continue
+        checks.append(_bound("position error " + name, 1e3 * position[medium].max(), 2.0, "mm"))
+        peak = orientation[medium].max()
+        checks.append(Check("orientation error " + name, f"{peak:.3f} rad", "> 0.05 rad", bool(peak > 0.05)))
     if windows:
-        later = windows[-1][1] + 10.0
-        if later <= log.time[-1]:
-            k = int(np.searchsorted(log.time, later))
-            name = "10 s after the last withdrawal"
-            checks.append(_bound("position error " + name, 1e3 * position[k:].max(), 1.0, "mm"))
-            checks.append(_bound("orientation error " + name, orientation[k:].max(), 0.01, "rad"))
+        k = int(np.searchsorted(log.time, windows[-1][1] + 10.0))
+        checks += _pair("10 s after the last withdrawal", position[k:], orientation[k:], (1.0, 0.01))
     return checks
+
+
+def _pair(when: str, position: Array, orientation: Array, bounds: tuple[float, float]) -> list[Check | str]:
+    """Bounds of position and orientation error, largest values of some ticks [m, rad]; in [mm, rad]."""
+    names = f"position error {when}", f"orientation error {when}"
+    if not len(position):
+        return [*names]
+    return [
+        _bound(names[0], 1e3 * position.max(), bounds[0], "mm"),
+        _bound(names[1], orientation.max(), bounds[1], "rad"),
+    ]
 
 
 def _limits(log: RunLog, robot: Robot) -> list[Check]:

@@ -37,6 +37,8 @@ OUTPUTS = ("q_ref", "qd_ref", "cdf_n", "m", "f", "regime", "phase", "status")
 #: Packages whose arithmetic decides the last bits.
 PACKAGES = ("qpsafe", "numpy", "scipy", "numba", "pin", "mujoco", "daqp", "ruckig")
 FPS = 25
+#: No run of ten minutes, the longest that a demo makes, expands to a third of this [bytes].
+LARGEST = 2**29
 
 
 class RunFileError(QpsafeError, ValueError):
@@ -145,12 +147,18 @@ def read_run(path: str | Path) -> RunFile:
     """Read a run.
 
     Raises:
-        RunFileError: The file is missing, damaged, cut short, of another kind or of a newer version.
+        RunFileError: The file is missing, damaged, cut short, of another kind, of a newer version, or would expand to
+            more than `LARGEST`.
     """
     path = Path(path)
     try:
+        with zipfile.ZipFile(path) as members:  # which reads no more of a member than it states
+            expanded = sum(member.file_size for member in members.infolist())
+        if expanded > LARGEST:
+            size = f"{expanded / 2**20:,.0f} MiB"
+            raise RunFileError(f"{path}: it would expand to {size}; a run has at most {LARGEST // 2**20} MiB")
         with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile) or "header" not in archive:
+            if "header" not in archive:
                 raise RunFileError(f"{path}: not a run of qpsafe: it has no header")
             header = json.loads(str(archive["header"]))
             arrays = {name: archive[name] for name in archive.files if name != "header"}
@@ -158,10 +166,7 @@ def read_run(path: str | Path) -> RunFile:
         raise
     except FileNotFoundError:
         raise RunFileError(f"{path}: no such file") from None
-    except ValueError as problem:
-        why = "no NumPy archive" if "pickle" in str(problem) else str(problem)
-        raise RunFileError(f"{path}: damaged, or not a run of qpsafe: {why}") from None
-    except (OSError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as problem:  # type: ignore[attr-defined]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.zlib.error) as problem:  # type: ignore[attr-defined]
         raise RunFileError(f"{path}: damaged, or not a run of qpsafe: {problem}") from None
     except (NotImplementedError, RuntimeError, AttributeError, TypeError, MemoryError) as problem:
         raise RunFileError(f"{path}: not a run of qpsafe: {problem}") from None
@@ -186,6 +191,12 @@ def _check(path: Path, header: Any, arrays: dict[str, NDArray]) -> None:
     for key in ("settings", "versions", "messages", "spots", "dt", "robot_files"):
         if key not in header:
             raise RunFileError(f"{path}: its header lacks {key!r}")
+    kinds = {"settings": dict, "versions": dict, "messages": list, "spots": list, "dt": float, "robot_files": str}
+    for key, kind in kinds.items():
+        if not isinstance(header[key], kind):
+            raise RunFileError(f"{path}: {key!r} in its header is no {kind.__name__}")
+    if not all(isinstance(m, list) and [type(part) for part in m] == [int, str] for m in header["messages"]):
+        raise RunFileError(f"{path}: 'messages' in its header are no pairs of tick and text")
     if header.get("digest") != _digest(header, arrays):
         raise RunFileError(f"{path}: not as it was written: its digest is another one")
     for name in (*INPUTS, *OUTPUTS):

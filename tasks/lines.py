@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 
 Key = tuple[str | int, ...]
-_HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]")
-_KEY = re.compile(r"\s*([\w.\"'-]+)\s*=")
+_HEAD = re.compile(r"\s*+(\[\[?)([^\]]++)\]")
+_KEY = re.compile(r"\s*+([\w.\"'-]++)\s*+=")
 
 
 def line_of(text: str, keys: Sequence[str | int]) -> int:
@@ -22,26 +22,26 @@ def line_of(text: str, keys: Sequence[str | int]) -> int:
 def key_lines(text: str) -> dict[Key, int]:
     """Line, from 1, of every table and every key at the beginning of a line; keys of inline tables have none."""
     found: dict[Key, int] = {}
+    counts: dict[Key, int] = {}  # of the tables in each array so far
     table: Key = ()
     for number, line in enumerate(text.splitlines(), start=1):
         if head := _HEAD.match(line):
-            table = _inside(found, _split(head.group(2)))
+            table = _inside(counts, _split(head.group(2)))
             if head.group(1) == "[[":
-                count = sum(1 for key in found if key[:-1] == table and isinstance(key[-1], int))
-                table = (*table, count)
+                counts[table] = counts.get(table, 0) + 1
+                table = (*table, counts[table] - 1)
             found.setdefault(table, number)
         elif key := _KEY.match(line):
             found.setdefault((*table, *_split(key.group(1))), number)
     return found
 
 
-def _inside(found: dict[Key, int], table: Key) -> Key:
+def _inside(counts: dict[Key, int], table: Key) -> Key:
     """A header's key with the numbers of the array tables it is in: the latest of each."""
     key: Key = ()
     for part in table[:-1]:
         key = (*key, part)
-        count = sum(1 for other in found if other[:-1] == key and isinstance(other[-1], int))
-        key = (*key, count - 1) if count else key
+        key = (*key, counts[key] - 1) if key in counts else key
     return (*key, *table[-1:])
 
 

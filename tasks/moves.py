@@ -53,10 +53,13 @@ class Line(Fixed):
         self.start, self.goal = checked_pose(name, "start", start), checked_pose(name, "goal", goal)
         self._turn = log3(self.goal[:3, :3] @ self.start[:3, :3].T)
         self._shift = self.goal[:3, 3] - self.start[:3, 3]
-        length, angle = self._length(), float(np.linalg.norm(self._turn))
-        if not max(length, angle) > SMALL:
-            raise ConfigurationError(name, "goal", "the start itself", "a pose to move to")
-        rates = [r.over(size) for r, size in ((self._admissible(linear), length), (angular, angle)) if size > SMALL]
+        #: Length of the path [m], and the angle by which the orientation turns [rad].
+        self.length, self.angle = self._length(), float(np.linalg.norm(self._turn))
+        if not SMALL < max(self.length, self.angle) < math.inf:
+            expected = "a pose to move to, at a finite distance from the start"
+            raise ConfigurationError(name, "goal", self.goal[:3, 3].tolist(), expected)
+        sizes = (self._admissible(linear), self.length), (angular, self.angle)
+        rates = [r.over(size) for r, size in sizes if size > SMALL]
         tightest = rates[0] if len(rates) == 1 else rates[0].both(rates[1])
         #: Time law of the share u of the way, from 0 to 1.
         self.law = TimeLaw([0.0], [1.0], [tightest.speed], [tightest.acceleration], [tightest.jerk])

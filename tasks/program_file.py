@@ -1,6 +1,6 @@
 """A program as a small TOML file that a person can edit; what is wrong in it is named with its line.
 
-frame = "tcp"                     # of the robot; the tool's tip
+frame = "tcp"                     # of the robot; by default the tip of its (first) tool
 cycle = true                      # begin again at the end
 start = "left"                    # a point; by default where the robot's home pose is
 
@@ -34,7 +34,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.moves import Arc, Dwell, JointMove, JointMoveOfFrame, Line, Move
 from qpsafe.tasks.program import Program
 from qpsafe.tasks.program_tables import ArcSegment, DwellSegment, EventSegment, JointSegment, Point, ProgramFile
-from qpsafe.tasks.reach import UnreachableError, follow, joints_for
+from qpsafe.tasks.reach import UnreachableError, checked_poses, follow, joints_for
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.timing import Rates
 from qpsafe.tasks.toml_text import TomlText
@@ -66,6 +66,8 @@ def load_program(path: str | Path, robot: Robot) -> Program:
 
 
 _KINDS = ("line", "arc", "joint", "dwell", "event")
+#: Poses along all moves: some ten seconds of checking.
+MOST_CHECKS = 20_000
 
 
 class _Builder:
@@ -73,8 +75,11 @@ class _Builder:
 
     def __init__(self, text: TomlText, file: ProgramFile, robot: Robot) -> None:
         self.wrong, self.file, self.robot = text.wrong, file, robot
-        if file.frame not in robot.frame_names:
-            raise self.wrong(["frame"], file.frame, "one of " + ", ".join(robot.frame_names))
+        self.frame = robot.tool_frames[0] if file.frame is None else file.frame
+        self.checks = 0  # so far, of poses along the moves
+        if self.frame not in robot.frame_names:
+            expected = f"one of {', '.join(robot.frame_names)}; without this key {robot.tool_frames[0]!r} is meant"
+            raise self.wrong(["frame"], file.frame, expected)
         for name, point in file.points.items():
             if (point.joints is None) == (point.position is None) or (point.joints and point.euler):
                 raise self.wrong(["points", name], point.model_dump(exclude_none=True), "either position or joints")
@@ -91,15 +96,16 @@ class _Builder:
                 if choice not in file.points:
                     raise self.wrong(["vary", name], choice, "points, of " + ", ".join(file.points))
         self.q: Array = robot.home
-        self.first: Array = robot.pose(file.frame, self.q)  # gives the orientation of points without one
+        self.first: Array = robot.pose(self.frame, self.q)  # gives the orientation of points without one
         if file.start is not None:
             self.q = self.joints(["start"], file.start)
-            self.first = robot.pose(file.frame, self.q)
+            self.first = robot.pose(self.frame, self.q)
 
     def program(self) -> Program:
         moves: list[Move] = []
         events: list[tuple[int, str]] = []
-        for number in range(math.lcm(*(len(choices) for choices in self.file.vary.values()))):
+        self.count(self.rounds * len(self.file.segment))
+        for number in range(self.rounds):
             self.round = number
             for k, segment in enumerate(self.file.segment):
                 if isinstance(segment, EventSegment):
@@ -111,20 +117,20 @@ class _Builder:
         if not moves:
             raise self.wrong(["segment"], "only events", "at least one move or dwell")
         try:
-            return Program(moves, events, self.file.cycle, self.file.frame)
+            return Program(moves, events, self.file.cycle, self.frame)
         except ConfigurationError as problem:
             raise self.wrong(["cycle"], self.file.cycle, f"an end at the start; {problem.expected}") from None
 
     @property
     def pose(self) -> Array:
-        return self.robot.pose(self.file.frame, self.q)
+        return self.robot.pose(self.frame, self.q)
 
     def move(self, k: int, segment: Any) -> Move:
         if isinstance(segment, DwellSegment):
             return Dwell(self.pose, segment.time)
         key: list[str | int] = ["segment", k, "to"]
-        robot, frame = self.robot, self.file.frame
-        move: Move
+        robot, frame = self.robot, self.frame
+        move: Line
         try:
             if isinstance(segment, JointSegment):
                 goal = self.joints(key, segment.to)
@@ -139,15 +145,29 @@ class _Builder:
                 move = Arc(self.pose, via, self.target(key, segment.to, segment.above), linear, angular)
             else:
                 move = Line(self.pose, self.target(key, segment.to, segment.above), linear, angular)
+            self.count(checked_poses(move))
             self.q = follow(robot, frame, move, self.q)
         except UnreachableError as problem:
             raise self.wrong(key, self.chosen(segment.to), f"a goal that can be reached so: {problem}") from None
         except ProgramError:
             raise
-        except ConfigurationError as problem:
-            name = "to" if problem.key == "goal" else problem.key
+        except ConfigurationError as problem:  # of the move: its via, or where it goes with these rates
+            name = problem.key if problem.key == "via" else "to"
             raise self.wrong(["segment", k, name], getattr(segment, name), problem.expected) from None
         return move
+
+    @property
+    def rounds(self) -> int:
+        """How often the segments run before what varies begins anew."""
+        return math.lcm(*(len(choices) for choices in self.file.vary.values()))
+
+    def count(self, poses: int) -> None:
+        """Give up where a program is so long that to follow it takes minutes."""
+        self.checks += poses
+        if self.checks > MOST_CHECKS:
+            found = f"{len(self.file.segment)} segments in {self.rounds} rounds"
+            expected = f"a program with at most {MOST_CHECKS} poses to check; run it in parts, each from its own file"
+            raise self.wrong(["segment"], found, expected)
 
     def rates(self, speed: float | None) -> tuple[Rates, Rates]:
         r = self.file.rates
@@ -174,7 +194,7 @@ class _Builder:
     def pose_of(self, keys: list, name: str) -> Array:
         point = self.point(keys, name)
         if point.joints is not None:
-            return self.robot.pose(self.file.frame, np.deg2rad(point.joints)).copy()
+            return self.robot.pose(self.frame, np.deg2rad(point.joints)).copy()
         pose = self.first.copy()
         pose[:3, 3] = point.position
         if point.euler is not None:
@@ -191,7 +211,7 @@ class _Builder:
         problem: UnreachableError | None = None
         for guess in (self.q, self.robot.home):
             try:
-                return joints_for(self.robot, self.file.frame, goal, guess)
+                return joints_for(self.robot, self.frame, goal, guess)
             except UnreachableError as found:
                 problem = problem or found
         raise self.wrong(keys, name, f"a point that can be reached: {problem}")

@@ -6,9 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
-Vector = tuple[Finite, Finite, Finite]
+# wide enough for any robot; beyond it numbers are mistakes, and arithmetic with them would only hide which
+Length = Annotated[float, Field(strict=True, ge=-100.0, le=100.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-3600.0, le=3600.0, allow_inf_nan=False)]
+Rate = Annotated[float, Field(strict=True, ge=1e-4, le=1e9, allow_inf_nan=False)]
+Share = Annotated[float, Field(strict=True, ge=1e-4, le=1.0, allow_inf_nan=False)]  # of the robot's own limits
+Place = tuple[Length, Length, Length]
+Angles = tuple[Angle, Angle, Angle]
 Name = Annotated[str, Field(strict=True, min_length=1)]
 
 
@@ -21,21 +25,21 @@ class Table(BaseModel):
 class RatesTable(Table):
     """Rates of all moves: m, deg, s."""
 
-    speed: Positive = 0.25
-    acceleration: Positive = 1.0
-    jerk: Positive = 10.0
-    angular_speed: Positive = 45.0
-    angular_acceleration: Positive = 180.0
-    angular_jerk: Positive = 1800.0
-    joints: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] = 0.3  # share of the robot's own limits
+    speed: Rate = 0.25
+    acceleration: Rate = 1.0
+    jerk: Rate = 10.0
+    angular_speed: Rate = 45.0
+    angular_acceleration: Rate = 180.0
+    angular_jerk: Rate = 1800.0
+    joints: Share = 0.3
 
 
 class Point(Table):
     """A place: a position in m with angles in deg, or joint positions in deg."""
 
-    position: Vector | None = None
-    euler: Vector | None = None
-    joints: list[Finite] | None = None
+    position: Place | None = None
+    euler: Angles | None = None
+    joints: list[Angle] | None = None
 
 
 class LineSegment(Table):
@@ -43,8 +47,8 @@ class LineSegment(Table):
 
     do: Literal["line"]
     to: Name
-    above: Finite = 0.0
-    speed: Positive | None = None
+    above: Length = 0.0
+    speed: Rate | None = None
 
 
 class ArcSegment(Table):
@@ -53,8 +57,8 @@ class ArcSegment(Table):
     do: Literal["arc"]
     via: Name
     to: Name
-    above: Finite = 0.0
-    speed: Positive | None = None
+    above: Length = 0.0
+    speed: Rate | None = None
 
 
 class JointSegment(Table):
@@ -68,7 +72,7 @@ class DwellSegment(Table):
     """Stay [s]."""
 
     do: Literal["dwell"]
-    time: Positive
+    time: Annotated[float, Field(strict=True, gt=0.0, le=86400.0, allow_inf_nan=False)]
 
 
 class EventSegment(Table):
@@ -76,7 +80,7 @@ class EventSegment(Table):
 
     do: Literal["event"]
     name: Name
-    dwell: Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)] = 0.0
+    dwell: Annotated[float, Field(strict=True, ge=0.0, le=86400.0, allow_inf_nan=False)] = 0.0
 
 
 Segment = Annotated[LineSegment | ArcSegment | JointSegment | DwellSegment | EventSegment, Field(discriminator="do")]
@@ -85,7 +89,7 @@ Segment = Annotated[LineSegment | ArcSegment | JointSegment | DwellSegment | Eve
 class ProgramFile(Table):
     """The whole file."""
 
-    frame: Name = "tcp"
+    frame: Name | None = None
     cycle: Annotated[bool, Field(strict=True)] = False
     start: Name | None = None
     rates: RatesTable = RatesTable()

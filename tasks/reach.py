@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
-from qpsafe.tasks.moves import Move
+from qpsafe.tasks.moves import Line
 from qpsafe.tasks.rotation import log3
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
+
+#: A path is checked this often, or, where it is slow, after this way [s, m, rad].
+PERIOD, STRIDE, TURN = 0.02, 0.005, 0.016
 
 
 class UnreachableError(QpsafeError, ValueError):
@@ -49,20 +53,29 @@ def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int =
     raise UnreachableError(f"{reason}: nearest found is {shift:.1f} mm and {turn:.3f} rad away")
 
 
-def follow(robot: Robot, frame: str, move: Move, q: Array, period: float = 0.02) -> Array:
-    """Joint positions (n,) at the end of a move that starts at q.
+def checked_poses(move: Line) -> int:
+    """At how many poses `follow` checks a move: every `PERIOD`, or every `STRIDE` and `TURN` where it is slower.
+
+    A jerk-limited motion is at most twice as fast as on average, hence the factor of 2.
+    """
+    finest = 2.0 * max(move.length / STRIDE, move.angle / TURN)
+    return max(math.ceil(min(move.duration / PERIOD, finest)), 1)
+
+
+def follow(robot: Robot, frame: str, move: Line, q: Array) -> Array:
+    """Joint positions (n,) at the end of a line or an arc that starts at q.
 
     Raises:
         UnreachableError: A pose on the way cannot be taken, or some joint would be too fast.
     """
-    count = max(int(np.ceil(move.duration / period)), 1)
+    count = checked_poses(move)
     for k in range(1, count + 1):
         t = move.duration * k / count
         try:
             after = joints_for(robot, frame, move.sample(t).pose, q, steps=30)
         except UnreachableError as problem:
             raise UnreachableError(f"{t:.2f} s on the way, {problem}") from None
-        speed = np.abs(after - q) * count / move.duration if move.duration > 0.0 else np.zeros(len(q))
+        speed = np.abs(after - q) * count / move.duration
         fastest = int((speed / robot.max_velocity).argmax())
         if not speed[fastest] <= robot.max_velocity[fastest]:
             name, limit = robot.joint_names[fastest], robot.max_velocity[fastest]

@@ -72,7 +72,8 @@ class TimeLaw(Fixed):
             motion brakes first.
 
     Raises:
-        ConfigurationError: Something is not finite, or a rate is not positive.
+        ConfigurationError: Something is not finite, a rate is not positive, or the numbers are so large, so small or
+            so far apart that no switching times can be computed.
     """
 
     fixed = frozenset(("start", "goal", "duration"))
@@ -110,9 +111,13 @@ class TimeLaw(Fixed):
         problem.max_velocity, problem.max_acceleration = checked["speed"].tolist(), checked["acceleration"].tolist()
         problem.max_jerk = checked["jerk"].tolist()
         found = ruckig.Trajectory(n)
-        result = ruckig.Ruckig(n).calculate(problem, found)
-        if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-            raise ConfigurationError("TimeLaw", "goal", goal, f"a motion that ruckig can time ({result})")
+        try:
+            result = ruckig.Ruckig(n).calculate(problem, found)
+        except ruckig.RuckigError:
+            result = ruckig.Result.Error
+        if result not in (ruckig.Result.Working, ruckig.Result.Finished) or not math.isfinite(found.duration):
+            rates = ", ".join(f"{key} {given[key]}" for key in ("speed", "acceleration", "jerk"))
+            raise ConfigurationError("TimeLaw", "goal", goal, f"a motion that ruckig can time with {rates}")
         self.start, self.goal = first, checked["goal"]
         self.duration = float(found.duration)
         pieces = [_phases(profile) for profile in found.profiles[0]]

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.lines import line_of
+from qpsafe.tasks.toml_parse import read_bounded, toml_table
 
 Keys = Sequence[str | int]
 Model = TypeVar("Model", bound=BaseModel)
@@ -37,8 +38,8 @@ class TomlText:
             ConfigurationError: Of the kind `error`: the file cannot be read.
         """
         try:
-            return cls(path.read_text(encoding="utf-8"), path, error)
-        except (OSError, UnicodeDecodeError) as problem:
+            return cls(read_bounded(path), path, error)
+        except (OSError, ValueError) as problem:
             raise error(path, "file", str(problem), "a readable TOML file") from None
 
     def checked(
@@ -55,7 +56,7 @@ class TomlText:
             ConfigurationError: Of the text's kind: no TOML, or the first value that is wrong, with file and line.
         """
         try:
-            table = tomllib.loads(self.text)
+            table = toml_table(self.text)
         except tomllib.TOMLDecodeError as problem:
             found = re.search(r"at line (\d+)", str(problem))
             line = found.group(1) if found else str(len(self.text.splitlines()))

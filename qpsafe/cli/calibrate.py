@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def calibrate(
-    file: Annotated[Path, typer.Argument(help="CSV with the columns spot, distance [m], voltage [V].")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="CSV with the columns spot, distance [m, cm or mm], voltage [V or mV]."),
+    ],
     robot: Annotated[
         str | None, typer.Option(help="Robot folder to write calibration.toml into; its spots must all be in the file.")
     ] = None,
@@ -29,23 +32,30 @@ def calibrate(
         typer.Option(help="Also draw curves and residuals into this PNG file.", callback=output_file(*DRAWN)),
     ] = None,
     tolerance: Annotated[float, typer.Option(min=0.0, help="95 % of the pairs must fit within this [m].")] = 0.01,
+    any_sensor: Annotated[
+        bool, typer.Option("--any-sensor", help="The voltages need not look like those of a Sharp GP2Y0A02YK.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Fit each spot's curve V(d) = gain/(d + offset) + bias robustly to the pairs between 20 and 80 cm.
 
-    Shows the residuals; exit code 1 if those of a spot exceed the tolerance (the curves are written all the same).
+    Shows the residuals. Exit code 1 if those of a spot exceed the tolerance, the pairs left out that are plainly wrong,
+    or if these are more than a tenth (the curves are written all the same).
     """
-    from qpsafe.sensing.calibration import calibration_text, fit_all, read_pairs
+    from qpsafe.sensing.calibration import calibration_text, fit_all
+    from qpsafe.sensing.pairs_file import read_pairs
 
     screen = console(json)
     target = _target(robot, out)
     fits = fit_all(read_pairs(file))
+    if not any_sensor:
+        _check_plausible(fits, file)
     if robot is not None:
         _check_names(robot, [fit.spot for fit in fits], file)
     write_text(target, calibration_text(fits))
     if plot is not None:
         _plot(fits, plot)
-    good = all(fit.error_95 <= tolerance for fit in fits)
+    good = all(_is_good(fit, tolerance) for fit in fits)
     if json:
         print_json({"file": str(target), "good": good, "spots": [_row(fit) for fit in fits]})
     else:
@@ -90,6 +100,21 @@ def _check_names(robot: str, found: list[str], file: Path) -> None:
             raise ConfigurationError(file, "spot", None, f"pairs of spot {name!r} too")
 
 
+def _check_plausible(fits: list[Fit], file: Path) -> None:
+    from qpsafe.errors import ConfigurationError
+    from qpsafe.sensing.calibration import implausible
+
+    for fit in fits:
+        odd = implausible(fit)
+        if odd is not None:
+            expected = "metres and volts of a Sharp GP2Y0A02YK; for another sensor say --any-sensor"
+            raise ConfigurationError(file, f"pairs of {fit.spot}", odd, expected)
+
+
+def _is_good(fit: Fit, tolerance: float) -> bool:
+    return fit.error_95 <= tolerance and fit.few_wrong
+
+
 def _row(fit: Fit) -> dict[str, float | str | int]:
     curve = fit.curve
     return {
@@ -99,6 +124,7 @@ def _row(fit: Fit) -> dict[str, float | str | int]:
         "bias": curve.bias,
         "pairs": len(fit.distances),
         "ignored": fit.ignored,
+        "wrong": int(fit.wrong.sum()),
         "rms": float((fit.errors**2).mean() ** 0.5),
         "error_95": fit.error_95,
         "worst": float(abs(fit.errors).max()),
@@ -111,21 +137,25 @@ def _show(fits: list[Fit], tolerance: float, screen: Console) -> None:
 
     from qpsafe.cli.sheet import Sheet
 
-    headings = ("spot", "pairs", "ignored", "rms [cm]", "95 % [cm]", "worst [cm]", "within 1 cm")
+    headings = ("spot", "pairs", "ignored", "wrong", "rms [cm]", "95 % [cm]", "worst [cm]", "within 1 cm")
     sheet = Sheet("Distance by the fitted curve minus true distance", headings)
     for fit in fits:
         row = _row(fit)
-        colour = "green" if fit.error_95 <= tolerance else "red"
+        colour = "green" if _is_good(fit, tolerance) else "red"
         sheet.add_row(
             fit.spot,
             str(row["pairs"]),
             str(row["ignored"]),
+            str(row["wrong"]),
             f"{100 * float(row['rms']):.2f}",
             Text(f"{100 * fit.error_95:.2f}", colour),
             f"{100 * float(row['worst']):.2f}",
             f"{100 * fit.share_within_1_cm:.1f} %",
         )
     screen.print(sheet)
+    for fit in fits:
+        for d, v in zip(fit.distances[fit.wrong], fit.voltages[fit.wrong], strict=True):
+            screen.print(f"{fit.spot}: the pair of {d:.3f} m and {v:.3f} V is left out as wrong", style="yellow")
 
 
 def _plot(fits: list[Fit], path: Path) -> None:

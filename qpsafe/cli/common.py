@@ -110,14 +110,18 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
         yield progress
 
 
-def show_checks(title: str, checks: Sequence[Check], screen: Console) -> None:
-    """Print what was measured beside what was promised."""
+def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: Sequence[str] = ()) -> None:
+    """Print what was measured beside what was promised, and which promises the run could neither keep nor break."""
     from qpsafe.cli.sheet import Sheet
 
     sheet = Sheet(title, ("", "", "measured", "promised"), text=range(4))
     for check in checks:
         sheet.add_row(verdict(check.kept), check.name, check.measured, check.promised)
     screen.print(sheet)
+    if left_out:
+        screen.print("left out, since nothing of the kind happened in so short a run:", style="yellow")
+        for name in left_out:
+            screen.print(f"  {name}")
 
 
 def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], screen: Console, as_json: bool) -> None:

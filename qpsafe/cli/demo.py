@@ -205,7 +205,7 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
     from qpsafe.sim.story_plots import encounter_figure
 
     without = experiment.board_distance_without_controller()
-    report = summarise(log, without, experiment.windows(), experiment.robot)
+    report = summarise(log, without, experiment.walk.windows, experiment.robot)
     log.write_csv(out / "signals.csv")
     activation = robot_activation(experiment.robot)
     figure_11(log, out / "figure.png", f"First experiment, {experiment.robot.name}, {title}", activation)
@@ -250,7 +250,7 @@ def show(report: Report, title: str, screen: Console) -> None:
             sheet.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
         screen.print(sheet)
 
-    show_checks("What the run should show", report.checks, screen)
+    show_checks("What the run should show", report.checks, screen, report.left_out)
     position, orientation = report.tracking
     screen.print(
         f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "

@@ -202,7 +202,7 @@ def _controller(
     goal: Any = FixedPose(found.pose(tool, found.home))
     if program is not None:
         goal = load_program(program, found)
-        tool = goal.frame or tool
+        tool = goal.frame
     return SafetyController(found, [PositionTask(tool, goal), OrientationTask(tool, goal)], law, known=known)
 
 

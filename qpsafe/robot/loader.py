@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from importlib.resources import files
 from pathlib import Path
@@ -90,9 +91,9 @@ def find_robot(name_or_path: str | Path) -> Path:
     if str(name_or_path) in bundled:
         return _bundled_folder() / str(name_or_path) / "robot.toml"
     path = Path(name_or_path)
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir, False for what cannot be a name
         return path / "robot.toml"
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     expected = (
         f"a bundled robot ({', '.join(bundled)}), the path of a robot folder, an MJCF or a URDF file, or PACKAGE:MODEL"
@@ -105,7 +106,7 @@ def _load_described(path: Path, model_path: Path | None) -> Robot:
     file = read_robot_file(path)
     if model_path is None:
         model_path = path.parent / file.model
-        if not model_path.is_file():
+        if not os.path.isfile(model_path):
             raise RobotFileError(path, "model", file.model, "a file in the same folder")
     model_file = read_model(model_path, trusted=_bundled_folder() in path.parents)
     robot = Robot(_to_spec(path, file, model_path, model_file), model_file.model)
@@ -167,7 +168,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         folder=path.parent,
         model_path=model_path,
         notes=model_file.notes,
-        spots_path=spots if spots is not None and spots.is_file() else None,
+        spots_path=spots if spots is not None and os.path.isfile(spots) else None,
         joint_names=tuple(names),
         lower=rad * np.array([joint.lower for joint in joints]),
         upper=rad * np.array([joint.upper for joint in joints]),

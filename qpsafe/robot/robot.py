@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -115,7 +116,7 @@ class Robot(Fixed):
         """
         other = copy(self)
         path = None if file is None else self.folder / file
-        if path is not None and not path.is_file():
+        if path is not None and not os.path.isfile(path):  # no error for names that no system can have
             path = Path(file)  # type: ignore[arg-type]
         other.__dict__["spots_path"] = path
         return other

@@ -8,6 +8,7 @@ names the file, the key and the value.
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from qpsafe.errors import RobotFileError
+from qpsafe.tasks.toml_parse import read_bounded, toml_table
 from qpsafe.words import counted
 
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
@@ -159,11 +161,11 @@ def read_robot_file(path: Path) -> RobotFile:
         RobotFileError: The file is missing, is no TOML, or a value in it is wrong.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_bounded(path)
+    except (OSError, ValueError) as error:
         raise RobotFileError(path, "file", path.name, f"a readable UTF-8 file ({error})") from error
     try:
-        raw = tomllib.loads(text)
+        raw = toml_table(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(path, text, error) from error
     try:
@@ -231,7 +233,7 @@ def _check_region(path: Path, key: str, region: RegionTable, file: RobotFile) ->
     for low, high in zip(region.lower, region.upper, strict=True):
         if not low < high:
             raise RobotFileError(path, f"{key}.lower", region.lower, f"below upper = {region.upper} on each axis")
-    if region.mesh is not None and not (path.parent / region.mesh).is_file():
+    if region.mesh is not None and not os.path.isfile(path.parent / region.mesh):
         raise RobotFileError(path, f"{key}.mesh", region.mesh, "a mesh file in the same folder")
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.sensing.sharp import SharpConverter, SharpCurve
+from qpsafe.tasks.toml_parse import read_bounded, toml_table
 from qpsafe.words import counted
 
 if TYPE_CHECKING:
@@ -28,7 +27,11 @@ FILE_NAME = "calibration.toml"
 #: Range of distances that is fitted, the source's [m].
 FITTED = (0.20, 0.80)
 FEWEST = 6  # pairs a spot: twice the number of parameters
-_COLUMNS = ("spot", "distance", "voltage")
+#: Farther off the curve than this, and than this many robust standard deviations of the others, a pair is wrong [m].
+WRONG, DEVIATIONS = 0.03, 6.0
+MOST_WRONG = 0.1  # share of a spot's pairs that may be wrong
+#: Voltages over those of a typical unit: what units of this sensor can differ by.
+TYPICAL = (0.7, 1.4)
 
 
 @dataclass(frozen=True)
@@ -55,27 +58,37 @@ class Fit:
         return self.curve.distance(self.voltages) - self.distances
 
     @property
+    def wrong(self) -> NDArray[np.bool_]:
+        """Which pairs (n,) are mistakes, such as of somebody who stood in the way: far off what the others agree on."""
+        off = np.abs(self.errors)
+        return ~(off <= max(WRONG, DEVIATIONS * 1.4826 * float(np.median(off))))
+
+    @property
+    def few_wrong(self) -> bool:
+        """Whether so few pairs are wrong that the others tell the curve."""
+        return int(self.wrong.sum()) <= MOST_WRONG * len(self.distances)
+
+    @property
     def share_within_1_cm(self) -> float:
         """Share of the pairs whose distance the curve gives within 1 cm."""
         return float((np.abs(self.errors) <= 0.01).mean())
 
     @property
     def error_95(self) -> float:
-        """95 % of the pairs are at most this wrong [m]."""
-        return float(np.percentile(np.abs(self.errors), 95.0))
+        """95 % of the pairs that are not wrong are at most this far off [m]."""
+        return float(np.percentile(np.abs(self.errors[~self.wrong]), 95.0))
 
 
 def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
     """Fit V = gain/(d + offset) + bias to the pairs between 20 and 80 cm.
 
-    The loss is robust (soft L1 with a scale of 1 cm in distance): a few wrong pairs do not spoil the curve. Voltages
-    are weighted by the slope of the curve, so that errors in distance count, not in voltage.
+    The loss is robust (soft L1 with a scale of 1 cm in distance), and up to a tenth of the pairs that are then plainly
+    wrong are left out of a second fit: they do not spoil the curve. Voltages are weighted by the slope of the curve, so
+    that errors in distance count, not in voltage.
 
     Raises:
         ConfigurationError: Too few pairs, numbers that are not finite, or pairs that are no falling curve.
     """
-    from scipy.optimize import least_squares
-
     d, v = np.asarray(distances, dtype=float), np.asarray(voltages, dtype=float)
     where = f"calibration of {spot}"
     if d.ndim != 1 or d.shape != v.shape or not (np.isfinite(d).all() and np.isfinite(v).all()):
@@ -87,6 +100,18 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
         found = f"{counted(len(d), 'pair')} at {counted(len(np.unique(d)), 'distance')}"
         expected = f"at least {counted(FEWEST, 'pair')} at 4 distances between {FITTED[0]} and {FITTED[1]} m"
         raise ConfigurationError(where, "pairs", found, expected)
+    fit = Fit(spot, _fitted(d, v), d, v, ignored)
+    if fit.wrong.any() and fit.few_wrong:  # a robust loss bounds what they do to the curve: now nothing
+        fit = Fit(spot, _fitted(d[~fit.wrong], v[~fit.wrong]), d, v, ignored)
+    if not np.median(np.abs(fit.errors)) <= 0.05:
+        worst = f"a median error of {100 * np.median(np.abs(fit.errors)):.3g} cm"
+        raise ConfigurationError(where, "pairs", worst, "a voltage that falls with the distance (is m mixed with cm?)")
+    return fit
+
+
+def _fitted(d: Array, v: Array) -> SharpCurve:
+    from scipy.optimize import least_squares
+
     start = SharpCurve()
     slope = start.gain / (d + start.offset) ** 2  # |dV/dd|: volts per metre
 
@@ -100,12 +125,7 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
         loss="soft_l1",
         x_scale=(0.1, 0.02, 0.05),
     )
-    curve = SharpCurve(*(float(value) for value in result.x))
-    fit = Fit(spot, curve, d, v, ignored)
-    if not np.median(np.abs(fit.errors)) <= 0.05:
-        worst = f"a median error of {100 * np.median(np.abs(fit.errors)):.3g} cm"
-        raise ConfigurationError(where, "pairs", worst, "a voltage that falls with the distance (is m mixed with cm?)")
-    return fit
+    return SharpCurve(*(float(value) for value in result.x))
 
 
 def fit_all(pairs: Iterable[tuple[str, float, float]]) -> list[Fit]:
@@ -116,50 +136,24 @@ def fit_all(pairs: Iterable[tuple[str, float, float]]) -> list[Fit]:
     return [fit_curve(spot, *np.array(rows).T) for spot, rows in groups.items()]
 
 
-def read_pairs(path: Path) -> list[tuple[str, float, float]]:
-    """Pairs of a CSV file with the columns spot, distance [m], voltage [V], in any order, others ignored.
+def implausible(fit: Fit) -> str | None:
+    """What is odd about voltages that no Sharp GP2Y0A02YK gives at these distances, or None.
 
-    Raises:
-        ConfigurationError: Names the file, the line and the value that is wrong.
+    Units of the sensor differ by some 10 %. Distances in other units, or volts by another reference than that of the
+    converter, may fit a curve as well as right ones do.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(path, "file", path.name, f"a readable CSV file in UTF-8 ({error})") from None
-    reader = csv.reader(text.splitlines())
-    header = [cell.strip().lower() for cell in next(reader, [])]
-    for name in _COLUMNS:
-        if header.count(name) != 1:
-            raise ConfigurationError(path, "line 1", ",".join(header), f"the columns {', '.join(_COLUMNS)}")
-    places = [header.index(name) for name in _COLUMNS]
-    pairs = []
-    for row in reader:
-        if not "".join(row).strip():
-            continue
-        key = f"line {reader.line_num}"
-        if len(row) <= max(places) or not row[places[0]].strip():
-            raise ConfigurationError(path, key, ",".join(row), "a spot, a distance and a voltage")
-        values = [
-            _number(path, f"{key}, {name}", row[place]) for name, place in zip(_COLUMNS[1:], places[1:], strict=True)
-        ]
-        if not 0.0 < values[0] <= 5.0:
-            raise ConfigurationError(path, f"{key}, distance", values[0], "a distance in metres, 0 to 5")
-        if not 0.0 <= values[1] <= 5.0:
-            raise ConfigurationError(path, f"{key}, voltage", values[1], "a voltage in volts, 0 to 5")
-        pairs.append((row[places[0]].strip(), values[0], values[1]))
-    if not pairs:
-        raise ConfigurationError(path, "rows", 0, "at least one pair")
-    return pairs
-
-
-def _number(path: Path, key: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ConfigurationError(path, key, text, "a finite number (decimal point, no unit)")
-    return value
+    d, v, typical = fit.distances, fit.voltages, SharpCurve()
+    ratio = float(np.median(v / typical.voltage(d)))
+    if TYPICAL[0] <= ratio <= TYPICAL[1]:
+        return None
+    guesses = {
+        "distances in feet": np.median(v / typical.voltage(0.3048 * d)),
+        "a converter with a reference of 3.3 V taken for one of 5 V": ratio * 3.3 / 5.0,
+        "a converter with a reference of 5 V taken for one of 3.3 V": ratio * 5.0 / 3.3,
+    }
+    name, value = min(guesses.items(), key=lambda item: abs(math.log(max(float(item[1]), 1e-9))))
+    guess = f"; {name}?" if 1.0 / 1.2 <= value <= 1.2 else ""
+    return f"{ratio:.2f} times the voltages of a typical sensor{guess}"
 
 
 class _Curve(BaseModel):
@@ -170,6 +164,7 @@ class _Curve(BaseModel):
     bias: float
     error_95: float | None = None
     pairs: int | None = None
+    wrong: int | None = None
 
 
 class _File(BaseModel):
@@ -182,14 +177,14 @@ def calibration_text(fits: Sequence[Fit], sensor: str = "Sharp GP2Y0A02YK") -> s
     """The contents of a calibration file."""
     lines = [
         "# Written by `qpsafe calibrate`. V(d) = gain/(d + offset) + bias, 0.20 to 0.80 m.",
-        "# error_95: 95 % of the pairs are at most this wrong [m].",
+        "# error_95: 95 % of the pairs are at most this far off [m], those left out that are plainly wrong.",
         f'sensor = "{sensor}"',
     ]
     for fit in fits:
         name = fit.spot.replace("\\", "\\\\").replace('"', '\\"')
         lines += ["", "[[curve]]", f'spot = "{name}"']
         lines += [f"{key} = {getattr(fit.curve, key)!r}" for key in ("gain", "offset", "bias")]
-        lines += [f"error_95 = {fit.error_95:.5f}", f"pairs = {len(fit.distances)}"]
+        lines += [f"error_95 = {fit.error_95:.5f}", f"pairs = {len(fit.distances)}", f"wrong = {fit.wrong.sum()}"]
     return "\n".join(lines) + "\n"
 
 
@@ -200,13 +195,13 @@ def read_calibration(path: Path) -> dict[str, SharpCurve]:
         RobotFileError: The file is missing, is no TOML, or a value in it is wrong.
     """
     try:
-        content = _File.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise RobotFileError(path, "file", path.name, f"a readable TOML file ({error})") from None
+        content = _File.model_validate(toml_table(read_bounded(path)))
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise RobotFileError(path, key, first.get("input"), first["msg"]) from None
+    except (OSError, ValueError) as error:
+        raise RobotFileError(path, "file", path.name, f"a readable TOML file ({error})") from None
     curves: dict[str, SharpCurve] = {}
     for item in content.curve:
         if item.spot in curves:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -63,7 +64,7 @@ class Obstacle:
         """
         import coal  # type: ignore[import-untyped]
 
-        if not Path(path).is_file():
+        if not os.path.isfile(path):
             raise ConfigurationError(f"obstacle {name}", "path", str(path), "a mesh file")
         try:
             vertices = np.array(coal.MeshLoader().load(str(path), np.ones(3)).vertices(), dtype=float)

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from qpsafe.errors import RobotFileError
 from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.spots import Spot
+from qpsafe.tasks.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -81,13 +82,15 @@ def read_spots(path: Path, robot: Robot) -> list[Spot]:
 
 def _parse(path: Path) -> SpotFile:
     try:
-        return SpotFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        text = read_bounded(path)
     except OSError as error:
         raise RobotFileError(path, "file", str(path), f"a readable file ({error.strerror})") from None
+    except ValueError as error:
+        raise RobotFileError(path, "file", str(path), f"text in UTF-8 ({error})") from None
+    try:
+        return SpotFile.model_validate(toml_table(text))
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(path, "file", str(path), f"valid TOML ({error})") from None
-    except UnicodeDecodeError as error:
-        raise RobotFileError(path, "file", str(path), f"text in UTF-8 ({error})") from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])

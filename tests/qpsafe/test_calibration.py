@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 import qpsafe
 from qpsafe.cli.main import app
-from qpsafe.sensing.calibration import calibration_text, fit_curve, load_converter, read_calibration, read_pairs
+from qpsafe.sensing.calibration import calibration_text, fit_curve, load_converter, read_calibration
+from qpsafe.sensing.pairs_file import read_pairs
 from qpsafe.sensing.sharp import SharpConverter, SharpCurve
 from qpsafe.sim.sharp import SharpModel, SharpSensors
 
@@ -62,6 +63,48 @@ def test_wrong_pairs_do_not_spoil_the_curve() -> None:
     for fit in (clean, spoilt):
         assert np.abs(fit.curve.distance(curve.voltage(grid)) - grid).max() < 0.01
     assert np.sort(np.abs(spoilt.errors))[-3:].min() > 0.02  # the residuals show them
+
+
+@settings(max_examples=20)
+@given(st.integers(10, 40), st.integers(0, 2**32 - 1), st.floats(0.3, 1.5), st.data())
+def test_wrong_pairs_are_found_and_forgiven_up_to_a_tenth(n: int, seed: int, off: float, data: st.DataObject) -> None:
+    """Exactly the wrong pairs are found; up to a tenth of them spoil neither the curve nor what is said of it."""
+    rng = np.random.default_rng(seed)
+    curve, d = SharpCurve(0.72, 0.09, 0.02), np.linspace(0.2, 0.8, n)
+    v = curve.voltage(d) + rng.normal(0.0, 0.002, n)
+    wrong = rng.choice(n, data.draw(st.integers(0, n // 10)), replace=False)
+    v[wrong] += off
+    fit = fit_curve("a", d, v)
+    assert np.flatnonzero(fit.wrong).tolist() == sorted(wrong)
+    assert fit.few_wrong
+    assert fit.error_95 < 0.01
+
+
+def test_one_wrong_pair_of_14_is_named_and_three_are_too_many(tmp_path: Path) -> None:
+    d = np.linspace(0.2, 0.8, 14)
+    for wrong, code in (((), 0), ((4,), 0), ((4, 7, 11), 1)):
+        v = SharpCurve().voltage(d)
+        v[list(wrong)] += 0.6
+        csv = tmp_path / "pairs.csv"
+        csv.write_text("spot,distance,voltage\n" + "".join(f"a,{x:.4f},{y:.4f}\n" for x, y in zip(d, v, strict=True)))
+        result = run(csv, "--out", tmp_path / "c.toml")
+        assert result.exit_code == code, result.output
+        named = [line for line in result.output.splitlines() if "left out as wrong" in line]
+        assert len(named) == len(wrong)
+        if code == 0:
+            assert read_calibration(tmp_path / "c.toml")["a"].gain == pytest.approx(0.7, abs=1e-3)
+
+
+def test_another_sensor_is_refused_unless_that_is_meant(tmp_path: Path) -> None:
+    d = np.linspace(0.2, 0.8, 14)
+    rows = zip(d, SharpCurve(0.4).voltage(d), strict=True)
+    csv = tmp_path / "pairs.csv"
+    csv.write_text("spot,distance,voltage\n" + "".join(f"a,{x:.4f},{y:.4f}\n" for x, y in rows))
+    error = run(csv, "--out", tmp_path / "c.toml").exception
+    assert isinstance(error, qpsafe.ConfigurationError)
+    assert "typical" in str(error)
+    assert not (tmp_path / "c.toml").exists()
+    assert run(csv, "--out", tmp_path / "c.toml", "--any-sensor").exit_code == 0
 
 
 def test_what_cannot_be_a_distance_is_marked() -> None:

@@ -1,6 +1,6 @@
 """The source's first experiment, whole: what it must show, checked on the log."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -136,6 +136,24 @@ def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperimen
     assert report.kept, [check for check in report.checks if not check.kept]
     assert len(report.regimes) >= 13
     assert report.tracking[0] < 2e-3
+
+
+def test_a_shorter_run_leaves_promises_out_and_breaks_none(log: RunLog, experiment: FixedExperiment) -> None:
+    """However early a good run ends: what did not happen is named, the rest is kept, nothing is both or neither."""
+    n, without, windows = len(log.time), np.zeros(len(log.time)), experiment.walk.windows
+    names = None
+    for ticks in (n, 1, 2, 250, *range(1000, n, 1000)):
+        parts = {f.name: getattr(log, f.name) for f in fields(log)}
+        short = type(log)(
+            **{k: v[:ticks] if isinstance(v, np.ndarray) and len(v) == n else v for k, v in parts.items()}
+        )
+        report = summarise(short, without[:ticks], windows, ROBOT)
+        assert report.kept, (ticks, [check for check in report.checks if not check.kept])
+        found = [*(check.name for check in report.checks), *report.left_out]
+        names = names or sorted(found)  # of the whole run
+        assert sorted(found) == names
+        assert len(report.approaches) == sum(end <= ticks * log.dt + 1e-9 for _, end in windows)
+    assert len(report.checks) < len(names)  # type: ignore[arg-type]
 
 
 def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment) -> None:

@@ -1,7 +1,7 @@
 """The source's second experiment, shortened: one approach from the front while the tool follows its line."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -86,14 +86,41 @@ def test_recovery_is_gentler_than_none(strict: PathRun, without: PathRun) -> Non
 
 def test_the_report_names_what_is_not_kept(strict: PathRun, without: PathRun, nullspace: PathRun) -> None:
     found = {name: figures(run, ROBOT) for name, run in (("a", strict), ("b", without), ("c", nullspace))}
-    checks = promises(found["a"], found["b"], {"nullspace": found["c"]})
+    checks, left_out = promises(found["a"], found["b"], {"nullspace": found["c"]})
     assert all(check.kept for check in checks), checks
+    assert not left_out
     worse = replace(found["a"], step=1.1, resumed=2e-3, line_orientation=float("nan"))
-    broken = [check.name for check in promises(worse, found["b"], {"nullspace": found["c"]}) if not check.kept]
+    broken = [check.name for check in promises(worse, found["b"], {"nullspace": found["c"]})[0] if not check.kept]
     assert len(broken) == 3
-    report = to_dict(found, promises(worse, None, {}))
+    report = to_dict(found, *promises(worse, None, {}))
     assert not report["kept"]
     assert json.loads(json.dumps(report, allow_nan=False)) == report
+
+
+def cut(run: PathRun, ticks: int) -> PathRun:
+    """The beginning of a run."""
+    n = len(run.log.time)
+    parts = {
+        field.name: value[:ticks] if isinstance(value, np.ndarray) and len(value) == n else value
+        for field in fields(run.log)
+        for value in [getattr(run.log, field.name)]
+    }
+    parts["messages"] = tuple(message for message in run.log.messages if message[0] < ticks)
+    return PathRun(type(run.log)(**parts), run.path_time[:ticks], run.speed[:ticks], run.origin[:ticks])
+
+
+@pytest.mark.parametrize("ticks", [2, 30, 250, *range(525, 2750, 150), 2750])
+def test_a_shorter_run_leaves_promises_out_and_breaks_none(
+    strict: PathRun, without: PathRun, nullspace: PathRun, ticks: int
+) -> None:
+    """However early a good run ends: what did not happen is named, the rest is kept, nothing is both or neither."""
+    short = [figures(cut(run, ticks), ROBOT) for run in (strict, without, nullspace)]
+    checks, left_out = promises(short[0], short[1], {"nullspace": short[2]})
+    broken = [check for check in checks if not check.kept]
+    assert not broken
+    assert not [check for check in checks if "nan" in " ".join(check[1:3])]
+    names = [*(check.name for check in checks), *left_out]
+    assert len(set(names)) == len(names) == 9
 
 
 def test_the_figure_is_drawn(strict: PathRun, tmp_path: Path) -> None:

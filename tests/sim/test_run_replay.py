@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ from qpsafe.sim.fixed import FixedExperiment
 from qpsafe.sim.path import PathExperiment
 from qpsafe.sim.pick_place import PEOPLE, PickPlaceExperiment
 from qpsafe.sim.replay import replay
-from qpsafe.sim.run_file import INPUTS, OUTPUTS, RunFile, RunFileError, StateRecorder, read_run, write_run
+from qpsafe.sim.run_file import INPUTS, OUTPUTS, RunFile, RunFileError, StateRecorder, _digest, read_run, write_run
 from qpsafe.sim.settings import experiment_of, settings_of
 from qpsafe.sim.stage import Stage
 from qpsafe.sim.story_file import parse_story
@@ -159,6 +162,43 @@ def test_a_changed_array_is_not_as_it_was_written(recorded, tmp_path: Path) -> N
     np.savez(tmp_path / "forged.npz", **arrays)
     with pytest.raises(RunFileError, match="not as it was written"):
         read_run(tmp_path / "forged.npz")
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_a_small_file_that_expands_to_a_huge_one_is_refused_unread(tmp_path: Path, lies: bool) -> None:
+    """Whether the archive states the size, or only an array in it claims to be large."""
+    path = tmp_path / "bomb.npz"
+    entry = np.lib.format
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("header", "q"):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                entry.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (10**9,)})
+                for _ in range(1 if lies else 300):
+                    file.write(bytes(2**20))
+    assert path.stat().st_size < 2**20
+    tracemalloc.start()
+    with pytest.raises(RunFileError, match=r"bomb\.npz: " if lies else "expand to 600 MiB"):
+        read_run(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert lies or peak < 2**24
+
+
+@pytest.mark.parametrize("key", ["settings", "versions", "messages", "spots", "dt", "robot_files", "digest", "format"])
+@pytest.mark.parametrize("value", [None, [], [[1]], [[{}, "a"]], {}, "a", 7, 10**400])
+def test_a_header_of_other_kinds_is_refused(recorded, tmp_path: Path, key: str, value: Any) -> None:
+    """With a digest that fits: only what the header says is wrong."""
+    with np.load(recorded[0]) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    header = {**json.loads(str(arrays.pop("header"))), key: value}
+    if key != "digest":
+        header["digest"] = _digest(header, arrays)
+    np.savez(tmp_path / "other.npz", header=np.array(json.dumps(header)), **arrays)
+    try:
+        read_run(tmp_path / "other.npz").messages()
+    except RunFileError:
+        return
+    assert isinstance(value, {"settings": dict, "versions": dict, "messages": list, "spots": list}.get(key, str))
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x93NUMPY\x01\x00", b"PK\x03\x04 no archive"])

@@ -1,0 +1,82 @@
+"""Are these metres? Readings that nothing of their kind can tell, again and again, are centimetres or millimetres.
+
+A sensor that gives 42.0 for 42 cm, or points in millimetres, make the robot blind without anything being wrong with a
+single reading: what lies beyond the range is healthy. But lengths have a scale. Sensors on a robot's skin end at some
+metres, and the nearest that the source's tells, 0.15 m, is 15 in centimetres; what sees points around a robot ends at
+some tens of metres, and a cell's points in millimetres lie hundreds from its base. So a finite reading beyond
+`FARTHEST_READING` (or twice the range, if that is more), or points that all lie beyond `FARTHEST_POINT`, and this for
+`LASTING`, is said to be in another unit. One reading that may be metres begins the time anew; +inf says nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from qpsafe.sensing.spots import SpotArray
+
+#: Readings [m], and points from the world's origin [m], that nothing of their kind tells.
+FARTHEST_READING, FARTHEST_POINT = 10.0, 100.0
+#: For this long [s], looked at this many times.
+LASTING, LOOKS = 1.0, 10
+
+
+class UnitWatch:
+    """Watches what is given to `SafetyController.step`; what it has noticed stays until acknowledged.
+
+    Args:
+        spots: The distance sensors, or None.
+        dt: Tick [s].
+    """
+
+    def __init__(self, spots: SpotArray | None, dt: float) -> None:
+        self._names = () if spots is None else spots.names
+        ranges = np.zeros(0) if spots is None else np.asarray(spots.range_max, dtype=float)
+        self._farthest = np.maximum(FARTHEST_READING, 2.0 * ranges)
+        self._every = max(round(LASTING / LOOKS / dt), 1)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._tick, self._notes = 0, ()
+        self._counts = np.zeros(len(self._names), dtype=np.int64)
+        self._odd = np.zeros(len(self._names), dtype=np.bool_)
+        self._points = 0
+
+    #: A person has looked: what goes on will be noticed again.
+    acknowledge = reset
+
+    def notes(self, distances: Any, points: Any) -> tuple[str, ...]:
+        """What is odd, in words that change only when another spot joins; input as given to `step`, and accepted."""
+        self._tick += 1
+        if self._tick % self._every == 0:
+            given = distances if points is None else points
+            array = np.asarray(given, dtype=float)
+            if array.ndim == 1 and points is None:
+                self._look_at_readings(array)
+            else:
+                self._look_at_points(array)
+        return self._notes
+
+    def _look_at_readings(self, distances: np.ndarray) -> None:
+        far = np.isfinite(distances) & (distances > self._farthest)
+        self._counts[far] += 1
+        self._counts[(distances >= 0.0) & (distances <= self._farthest)] = 0
+        odd = self._odd | (self._counts >= LOOKS)
+        if (odd != self._odd).any():
+            self._odd = odd
+            who = ", ".join(name for name, is_odd in zip(self._names, odd, strict=True) if is_odd)
+            self._say(f"only readings beyond {FARTHEST_READING:g} m, which no such sensor tells: {who}")
+
+    def _look_at_points(self, points: np.ndarray) -> None:
+        if len(points) and (np.abs(points).max(axis=1) > FARTHEST_POINT).all():
+            self._points += 1
+            if self._points == LOOKS:
+                self._say(f"all points beyond {FARTHEST_POINT:g} m from the origin")
+        elif len(points):
+            self._points = 0
+
+    def _say(self, what: str) -> None:
+        meant = "are these centimetres or millimetres? metres are wanted, +inf where nothing is in sight"
+        self._notes = (f"{what}; {meant}",)
