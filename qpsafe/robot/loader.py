@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from qpsafe.errors import RobotFileError, RobotWarning
 from qpsafe.robot.defaults import spec_from_model
 from qpsafe.robot.dh import dh_frames
-from qpsafe.robot.model_file import ModelFile, read_model
+from qpsafe.robot.model_file import ModelFile, read_bundled, read_model
 from qpsafe.robot.package_model import find_package_model, is_package_model
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
@@ -36,8 +37,9 @@ def load_robot(
     max_velocity: ArrayLike | None = None,
     max_acceleration: ArrayLike | None = None,
     home: ArrayLike | None = None,
+    hold: Mapping[str, float] | None = None,
 ) -> Robot:
-    """Load a robot.
+    """Load a robot. Where a joint slides, limits are in m instead of rad.
 
     Args:
         name_or_path: A bundled name (see [`bundled_robots`][]); the path of a robot folder (with `robot.toml`); an MJCF
@@ -49,7 +51,9 @@ def load_robot(
         max_velocity: Speed limits for a bare model file, one number or (n,) [rad/s]; 1 where neither is stated (MJCF).
         max_acceleration: Acceleration limits for a bare model file, one number or (n,) [rad/s^2]; what reaches full
             speed in 0.25 s if not given.
-        home: Home pose for a bare model file, (n,) [rad]; zero, moved inside the limits, if not given.
+        home: Home pose for a bare model file, (n,) [rad]; if not given, the keyframe "home" of an MJCF, else zero,
+            moved inside the limits.
+        hold: Joints of a bare model file that are held in place, and where, e.g. ``{"finger": 0.02}`` [rad or m].
 
     Returns:
         The robot; what is missing or doubtful in its files stands in `robot.notes` and is warned of (`RobotWarning`).
@@ -68,11 +72,11 @@ def load_robot(
     path = find_robot(name_or_path)
     described = path if path.suffix == ".toml" else None if toml is None else Path(toml)
     if described is not None:
-        for key, value in given.items():
+        for key, value in (given | ({} if hold is None else {"hold": hold})).items():
             raise RobotFileError("load_robot", key, value, f"nothing: {described} states the limits; edit it instead")
         robot = _load_described(described, None if described is path else path)
     else:
-        file = read_model(path)
+        file = read_model(path, hold)
         robot = Robot(spec_from_model(path, file, given), file.model)
     if robot.notes:
         warnings.warn(f"{robot.model_path.name}: " + "; ".join(robot.notes), RobotWarning, stacklevel=2)
@@ -108,7 +112,10 @@ def _load_described(path: Path, model_path: Path | None) -> Robot:
         model_path = path.parent / file.model
         if not os.path.isfile(model_path):
             raise RobotFileError(path, "model", file.model, "a file in the same folder")
-    model_file = read_model(model_path, trusted=_bundled_folder() in path.parents)
+    if _bundled_folder() in path.parents:
+        model_file = read_bundled(model_path)
+    else:
+        model_file = read_model(model_path, file.hold, (file.units.radians, file.units.metres), file.joints.keys())
     robot = Robot(_to_spec(path, file, model_path, model_file), model_file.model)
     _check_kinematics(path, robot)
     return robot
@@ -120,10 +127,12 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
     names = list(model.names)[1:]  # 0 is pinocchio's universe
     for name in names:
         if name not in file.joints:
-            raise RobotFileError(path, f"joints.{name}", None, f"limits of this joint of {file.model}: it is missing")
+            expected = f"limits of this joint of {file.model}: it is missing, in [hold] too"
+            raise RobotFileError(path, f"joints.{name}", None, expected)
     for name in file.joints:
         if name not in names:
-            raise RobotFileError(path, f"joints.{name}", name, f"a joint of {file.model}: {', '.join(names)}")
+            expected = f"a revolute or prismatic joint of {file.model} that is not held: {', '.join(names)}"
+            raise RobotFileError(path, f"joints.{name}", name, expected)
     for name, target in file.frames.items():
         if not model.existFrame(target):
             expected = f"a site or body of {file.model} that moves, or a fixed body"
@@ -131,14 +140,15 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
 
     rad, m = file.units.radians, file.units.metres
     joints = [file.joints[name] for name in names]
+    slides = np.array([joint.shortname().startswith("JointModelP") for joint in list(model.joints)[1:]])
+    si = np.where(slides, m, rad)  # SI in one unit of each joint's figures
     home = dict(zip(file.joints, file.home, strict=True))
     for i, (name, joint) in enumerate(zip(names, joints, strict=True)):
         low, high = model.lowerPositionLimit[i], model.upperPositionLimit[i]
         for key, value in (("lower", joint.lower), ("upper", joint.upper)):
-            if not low - _TOLERANCE <= value * rad <= high + _TOLERANCE:
-                expected = (
-                    f"within the joint's range in {file.model}, {low / rad:g} to {high / rad:g} {file.units.angle}"
-                )
+            if not low - _TOLERANCE <= value * si[i] <= high + _TOLERANCE:
+                unit = file.units.length if slides[i] else file.units.angle
+                expected = f"within the joint's range in {file.model}, {low / si[i]:g} to {high / si[i]:g} {unit}"
                 raise RobotFileError(path, f"joints.{name}.{key}", value, expected)
     chains = []
     for table in file.denavit_hartenberg:
@@ -170,17 +180,19 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         notes=model_file.notes,
         spots_path=spots if spots is not None and os.path.isfile(spots) else None,
         joint_names=tuple(names),
-        lower=rad * np.array([joint.lower for joint in joints]),
-        upper=rad * np.array([joint.upper for joint in joints]),
-        max_velocity=rad * np.array([joint.max_velocity for joint in joints]),
-        max_acceleration=rad * np.array([joint.max_acceleration for joint in joints]),
-        home=rad * np.array([home[name] for name in names]),
+        lower=si * np.array([joint.lower for joint in joints]),
+        upper=si * np.array([joint.upper for joint in joints]),
+        max_velocity=si * np.array([joint.max_velocity for joint in joints]),
+        max_acceleration=si * np.array([joint.max_acceleration for joint in joints]),
+        home=si * np.array([home[name] for name in names]),
         frames=dict(file.frames),
         wire_frames=tuple((start, end) for start, end in file.wire.links),
         tools=tuple(Tool(t.frame, t.mounted_on, m * np.array(t.offset), t.mass) for t in file.tool),
         chains=tuple(chains),
         danger=None if danger is None else ((danger.delta, danger.epsilon), (danger.delta_f, danger.epsilon_f)),
         regions=regions,
+        held=model_file.held,
+        hulls=model_file.hulls,
     )
 
 
@@ -190,9 +202,9 @@ def _check_kinematics(path: Path, robot: Robot) -> None:
     for q in (robot.home, *rng.uniform(robot.lower, robot.upper, (3, robot.nq))):
         state = robot.at(q)
         for k, chain in enumerate(robot.chains):
-            base = state.pose(chain.frames[0])
+            base, order = state.pose(chain.frames[0]), list(chain.joints)
             for i, (frame, pose) in enumerate(
-                zip(chain.frames, dh_frames(chain.table, q[list(chain.joints)]), strict=True)
+                zip(chain.frames, dh_frames(chain.table, q[order], robot.sliding[order]), strict=True)
             ):
                 error = np.abs(state.pose(frame) - base @ pose).max()
                 if not error < _TOLERANCE:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.robot.kinematics import tree_of
+from qpsafe.robot.mjcf import ENDLESS
 from qpsafe.robot.spec import Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
@@ -23,6 +24,8 @@ _FLOAT = np.dtype(np.float64)
 
 class Robot(Fixed):
     """Kinematics and limits of one robot; SI units, world frame = the model's world. It does not change.
+
+    A joint that slides has metres where one that turns has radians.
 
     Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick
     and ask the state.
@@ -39,6 +42,9 @@ class Robot(Fixed):
         max_velocity: Speed limits, (n,) [rad/s].
         max_acceleration: Acceleration limits, (n,) [rad/s^2].
         home: A pose to start from, (n,) [rad].
+        sliding: Which joints slide, (n,).
+        endless: Which joints turn without end; joint tasks take the short way there, (n,).
+        held: Joints of the model file that are held in place, and where.
         frame_names: Names that `pose` and `jacobian` accept.
         wire_frames: Start and end frame of each segment of the wire model.
         wire_end_frames: The different frames in `wire_frames`, base to tip.
@@ -56,6 +62,7 @@ class Robot(Fixed):
         notes: What is missing or doubtful in the robot's files, in words; empty if nothing is.
         spots_path: File of the distance sensors, or None where there is none.
         regions: Parts of the surface that may carry distance sensors.
+        hulls: Reads the hulls of the collision geometry; use `qpsafe.sensing.body`, which keeps them.
         model: The pinocchio model.
     """
 
@@ -86,6 +93,8 @@ class Robot(Fixed):
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
         self.notes = spec.notes
+        self.held = spec.held
+        self.hulls = spec.hulls
         self.frame_names = tuple(spec.frames)
         self._frame_ids = {name: int(model.getFrameId(target)) for name, target in spec.frames.items()}
         self.wire_frames = spec.wire_frames
@@ -99,6 +108,8 @@ class Robot(Fixed):
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
         self.memory = self.tree.memory
+        self.sliding = ~self.tree.axes[:, 3:].any(axis=1)
+        self.endless = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
         frames = {name: model.frames[index] for name, index in self._frame_ids.items()}
         self._mountings = {
             name: (int(frame.parentJoint), _read_only(frame.placement.homogeneous)) for name, frame in frames.items()

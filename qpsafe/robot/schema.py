@@ -53,7 +53,7 @@ class Units(_Table):
 
 
 class JointLimits(_Table):
-    """Limits of one revolute joint: angle, angle per time, angle per time squared."""
+    """Limits of one joint: angle, angle per time, angle per time squared; length where it slides."""
 
     lower: Number
     upper: Number
@@ -134,6 +134,7 @@ class RobotFile(_Table):
     home: list[Number]
     units: Units
     joints: Annotated[dict[str, JointLimits], pydantic.Field(min_length=1)]
+    hold: dict[str, Number] = {}
     denavit_hartenberg: tuple[DenavitHartenberg, ...] = ()
     frames: Annotated[dict[str, Name], pydantic.Field(min_length=1)]
     wire: WireTable
@@ -184,13 +185,16 @@ def check(path: Path, file: RobotFile) -> None:
     """
     for name, joint in file.joints.items():
         if not joint.lower < joint.upper:
-            expected = f"less than upper = {joint.upper!r} {file.units.angle}"
+            expected = f"less than upper = {joint.upper!r}"
             raise RobotFileError(path, f"joints.{name}.lower", joint.lower, expected)
+    for name, value in file.hold.items():
+        if name in file.joints:
+            raise RobotFileError(path, f"hold.{name}", value, f"a joint without limits: [joints.{name}] says it moves")
     if len(file.home) != len(file.joints):
         raise RobotFileError(path, "home", file.home, f"{len(file.joints)} values, one a joint")
     for i, (value, (name, joint)) in enumerate(zip(file.home, file.joints.items(), strict=True)):
         if not joint.lower <= value <= joint.upper:
-            expected = f"within the limits of {name}, {joint.lower!r} to {joint.upper!r} {file.units.angle}"
+            expected = f"within the limits of {name}, {joint.lower!r} to {joint.upper!r}"
             raise RobotFileError(path, f"home[{i}]", value, expected)
     for i, link in enumerate(file.wire.links):
         _known_frames(path, f"wire.links[{i}]", link, file.frames)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from qpsafe.robot.hulls import BodyHull
+from qpsafe.robot.joint_choice import HeldJoint
 
 
 class Tool(NamedTuple):
@@ -68,7 +72,7 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """A robot described in SI units; arrays are in the order of the model's joints.
+    """A robot described in SI units; arrays are in the order of the model's joints, metres where a joint slides.
 
     Attributes:
         name: Short name, as given to `load_robot`.
@@ -90,6 +94,8 @@ class RobotSpec:
         spots_path: File of distance sensors, or None where there is none.
         manufacturer: Who makes it.
         regions: Parts of the surface that may carry distance sensors.
+        held: Joints of the model file that are held, and where.
+        hulls: Reads the hulls of its collision geometry.
     """
 
     name: str
@@ -111,3 +117,5 @@ class RobotSpec:
     spots_path: Path | None = None
     manufacturer: str = ""
     regions: tuple[Region, ...] = ()
+    held: Mapping[str, HeldJoint] = field(default_factory=dict)
+    hulls: Callable[[], list[BodyHull]] = list

@@ -26,7 +26,7 @@ def starting_robot_toml(robot: Robot, folder: Path) -> str:
         f"title = {_text(robot.title)}",
         f"model = {_text(name)}",
         '# spots = "spots.toml"             # distance sensors, if it carries any',
-        f"home = [{', '.join(_degrees(value) for value in robot.home)}]",
+        f"home = [{', '.join(map(_figure, robot.home, robot.sliding))}]",
         "",
         "[units]",
         'length = "m"',
@@ -38,7 +38,11 @@ def starting_robot_toml(robot: Robot, folder: Path) -> str:
     for i, joint in enumerate(robot.joint_names):
         lines += [f"[joints.{_text(joint)}]"]
         for key in ("lower", "upper", "max_velocity", "max_acceleration"):
-            lines += [f"{key} = {_degrees(getattr(robot, key)[i])}"]
+            lines += [f"{key} = {_figure(getattr(robot, key)[i], robot.sliding[i])}"]
+        lines += [""]
+    if robot.held:
+        lines += ["# Joints that are held in place, and where (angle or length).", "[hold]"]
+        lines += [f"{_text(name)} = {_figure(*joint)}" for name, joint in robot.held.items()]
         lines += [""]
     lines += ["# Name in qpsafe -> site, body or link of the model. Rename as you like.", "[frames]"]
     lines += [f"{_text(frame)} = {_text(frame)}" for frame in robot.frame_names]
@@ -73,8 +77,9 @@ def _offset(robot: Robot, mount: str, frame: str) -> list[float]:
     return [float(value) for value in offset]
 
 
-def _degrees(radians: float) -> str:
-    return repr(round(math.degrees(radians), 6) + 0.0)
+def _figure(value: float, sliding: bool) -> str:
+    """Degrees, or metres where a joint slides."""
+    return repr(round(float(value), 9) + 0.0) if sliding else repr(round(math.degrees(value), 6) + 0.0)
 
 
 def _text(value: str) -> str:

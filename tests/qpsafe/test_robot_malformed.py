@@ -31,6 +31,8 @@ URDF = f"""<robot name="two">
 ELBOW = URDF[URDF.index('  <joint name="elbow"') : URDF.index('  <link name="tip"/>')]
 LOOP = '<joint name="loop" type="fixed"><parent link="tip"/><child link="base"/></joint>'
 
+XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+
 # what is changed -> old text, new text, words of the place, words of what was expected
 WRONG_URDF = {
     "not XML": ("</robot>", "", "file", "MJCF or URDF"),
@@ -66,6 +68,38 @@ WRONG_URDF = {
     "limits the wrong way round": ('lower="-2"', 'lower="3"', "joint elbow: limit lower", "upper = 2.0"),
     "limits without room": ('lower="-2" upper="2"', 'lower="0" upper="0"', "elbow.lower", "less than upper"),
     "NaN speed": ('lower="-2" upper="2" velocity="3"', 'lower="-2" upper="2" velocity="nan"', "joint elbow", "number"),
+    "no name": ('robot name="two"', "robot", "robot: name", "a name"),
+    "left-over of xacro": ("</robot>", f"<xacro:arm {XACRO}/></robot>", "<xacro:arm>", "run xacro first"),
+    "left-over expression": ('xyz="0.5 0 0"', 'xyz="${length} 0 0"', "<origin>: xyz", "run xacro first"),
+    "left-over substitution": (
+        '<box size="0.1 0.1 0.3"/>',
+        '<mesh filename="$(find two)/a.stl"/>',
+        "<mesh>",
+        "run xacro",
+    ),
+    "NaN damping": ("</joint>", '<dynamics damping="nan"/></joint>', "joint shoulder: dynamics damping", "finite"),
+    "no damping": ("</joint>", "<dynamics/></joint>", "joint shoulder: dynamics", "damping or friction"),
+    "no k_velocity": ("</joint>", "<safety_controller/></joint>", "shoulder: safety_controller k_velocity", "finite"),
+    "word as soft limit": (
+        "</joint>",
+        '<safety_controller k_velocity="1" soft_upper_limit="x"/></joint>',
+        "joint shoulder: safety_controller soft_upper_limit",
+        "finite",
+    ),
+    "mimic of nothing": ("</joint>", '<mimic joint="knee"/></joint>', "joint shoulder: mimic joint", "another"),
+    "mimic of itself": ("</joint>", '<mimic joint="shoulder"/></joint>', "joint shoulder: mimic joint", "another"),
+    "mimic by a word": ("</joint>", '<mimic joint="elbow" offset="x"/></joint>', "shoulder: mimic offset", "finite"),
+    "mimic in the chain": (
+        '<axis xyz="0 1 0"/>',
+        '<axis xyz="0 1 0"/><mimic joint="shoulder"/>',
+        "joint elbow",
+        "moves on its own",
+    ),
+    "box without size": ('<box size="0.1 0.1 0.3"/>', "<box/>", "link fore: collision box size", "3 finite"),
+    "ball of no size": ('<box size="0.1 0.1 0.3"/>', '<sphere radius="0"/>', "collision sphere radius", "more than 0"),
+    "unknown shape": ('<box size="0.1 0.1 0.3"/>', "<cone/>", "link fore: collision geometry", "box"),
+    "NaN place of a shape": ("<geometry>", '<origin rpy="0 nan 0"/><geometry>', "collision: origin rpy", "finite"),
+    "no moments": ('ixx="1"', "", "link upper: inertia ixx", "finite"),
     "no links": (URDF, '<robot name="r"/>', "link", "at least one"),
     "no joints": (URDF, '<robot name="r"><link name="a"/></robot>', "joints", "at least one"),
 }
@@ -110,12 +144,19 @@ WRONG_MJCF = {
     "NaN place": ('pos="0.5 0 0"', 'pos="nan 0 0"', "<body> fore: pos", "finite"),
     "range the wrong way round": ('range="-100 100"', 'range="100 -100"', "file", "range"),
     "unknown element": (BOX, "<motor/>", "file", "motor"),
-    "a frame that one reader ignores": (
-        '<body name="fore" pos="0.5 0 0">',
-        '<frame pos="0 0 0.3"><body name="fore" pos="0.5 0 0">',
-        "joint elbow",
-        "<frame>",
+    "joints that move one another": (
+        "</worldbody>",
+        '</worldbody><equality><joint joint1="shoulder" joint2="elbow"/></equality>',
+        "joint shoulder",
+        "moves on its own",
     ),
+    "a closed loop in the chain": (
+        "</worldbody>",
+        '</worldbody><equality><connect body1="fore" anchor="0 0 0"/></equality>',
+        "joint elbow",
+        "moves on its own",
+    ),
+    "a plane as a body": (BOX, '<geom name="p" type="plane" size="1 1 1"/>', "file", "plane"),
     "no joints": (MJCF, '<mujoco><worldbody><body name="a"/></worldbody></mujoco>', "joints", "at least one"),
 }
 
@@ -123,8 +164,6 @@ WRONG_MJCF = {
 def changed(folder: Path, text: str, old: str, new: str) -> Path:
     assert old in text, old
     text = text.replace(old, new, 1)
-    if "<frame" in new:
-        text = text.replace("        </body>\n      </body>", "        </body></frame>\n      </body>")
     path = folder / ("two.urdf" if "<robot" in text else "two.xml")
     path.write_text(text, encoding="utf-8")
     return path
@@ -167,9 +206,8 @@ DOUBTFUL_URDF = {
     "infinite speed": ('"2" velocity="3"', '"2" velocity="inf"', "1 rad/s is taken: shoulder"),
     "no speed": ('upper="2" velocity="3"', 'upper="2"', "no speed limit"),
     "zero inertia": (INERTIA, "", "no mass or inertia is given for what moves: upper"),
-    "endless joint": ('"elbow" type="revolute"', '"elbow" type="continuous"', "±360°: elbow"),
-    "sliding joint": ('"elbow" type="revolute"', '"elbow" type="prismatic"', "held in place: elbow"),
-    "joint that mimics": ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="shoulder"/>', "mimic others"),
+    "endless joint": ('"elbow" type="revolute"', '"elbow" type="continuous"', "±1000 turns: elbow"),
+    "joint of no kind": ('"elbow" type="revolute"', '"elbow" type="floating"', "in place: elbow (floating)"),
 }  # fmt: skip
 DOUBTFUL_MJCF = {
     "no speeds": (MJCF, MJCF, "no speed limit in the file, 1 rad/s is taken: shoulder, elbow"),
@@ -178,12 +216,11 @@ DOUBTFUL_MJCF = {
         '<body name="cup"><freejoint/><geom size="1"/></body></worldbody>',
         "left out: cup",
     ),
-    "endless joint": ('range="-100 100" limited="true"', "", "±360°: elbow"),
-    "sliding joint": ('name="elbow" axis', 'name="elbow" type="slide" axis', "held in place: elbow"),
-    "coupled joints": (
-        "</worldbody>",
-        '</worldbody><equality><joint joint1="shoulder" joint2="elbow"/></equality>',
-        "equality constraints",
+    "endless joint": ('range="-100 100" limited="true"', "", "±1000 turns: elbow"),
+    "ball joint": (
+        'name="elbow" axis="0 1 0" range="-100 100"',
+        'name="elbow" type="ball" range="0 100"',
+        "elbow (ball)",
     ),
 }
 
@@ -211,12 +248,13 @@ def said(path: Path, note: str) -> None:
     assert (robot.lower < robot.upper).all()
 
 
-def test_a_held_joint_stays_where_it_is(tmp_path: Path) -> None:
-    old, new, _ = DOUBTFUL_URDF["sliding joint"]
+@pytest.mark.parametrize("text", [URDF, MJCF])
+def test_a_held_joint_stays_where_it_is_put(text: str, tmp_path: Path) -> None:
     with pytest.warns(RobotWarning):
-        robot = load_robot(changed(tmp_path, URDF, old, new))
+        robot = load_robot(changed(tmp_path, text, text, text), hold={"elbow": np.pi / 2})
     assert robot.joint_names == ("shoulder",)
-    np.testing.assert_allclose(robot.pose("tip", [0.0])[:3, 3], [0.75, 0.0, 0.0], atol=1e-15)
+    assert robot.held == {"elbow": (np.pi / 2, False)}
+    np.testing.assert_allclose(robot.pose("tip", [0.0])[:3, 3], [0.5, 0.0, -0.25], atol=1e-15)
 
 
 def test_a_tree_of_two_arms_has_a_wire_along_each(tmp_path: Path) -> None:
