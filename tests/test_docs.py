@@ -7,6 +7,9 @@ import re
 import shlex
 import subprocess
 import sys
+import types
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -97,13 +100,19 @@ def command_lines(page: Path) -> list[list[str]]:
     return [shlex.split(match[1], comments=True) for match in found if match]
 
 
+@cache
+def commands() -> Any:
+    """The whole command line."""
+    from qpsafe.cli.main import app
+
+    return typer.main.get_command(app)
+
+
 @pytest.mark.parametrize("page", ALL, ids=label)
 def test_commands_and_their_options_exist(page: Path) -> None:
     """Words in capitals stand for a value; a group's own name without a command is fine."""
-    from qpsafe.cli.main import app
-
     for words in command_lines(page):
-        command: Any = typer.main.get_command(app)
+        command = commands()
         for word in words:
             subcommands = getattr(command, "commands", {})
             if word.startswith("-"):
@@ -115,10 +124,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
 
 
 def test_the_readme_names_every_command() -> None:
-    from qpsafe.cli.main import app
-
     named = {words[0] for words in command_lines(README) if words}
-    assert set(typer.main.get_command(app).commands) <= named  # type: ignore[attr-defined]
+    assert set(commands().commands) <= named
 
 
 @pytest.mark.parametrize("page", ALL, ids=label)
@@ -142,18 +149,44 @@ def test_every_field_of_a_tick_is_explained() -> None:
     assert not [name for name in names if not re.search(rf"\b{name}\b", page)]
 
 
+def run_as_main(code: str, path: Path, arguments: Sequence[str], monkeypatch: pytest.MonkeyPatch) -> object:
+    """Exit code of a script that is run as the main module in a fresh namespace, without starting Python anew.
+
+    It is registered as `__main__` meanwhile: what a script defines may be looked up there.
+    """
+    main = types.ModuleType("__main__")
+    main.__file__ = str(path)
+    with monkeypatch.context() as patch:
+        patch.chdir(ROOT)
+        patch.setattr(sys, "argv", [str(path), *arguments])
+        patch.setitem(sys.modules, "__main__", main)
+        try:
+            exec(compile(code, str(path), "exec"), vars(main))
+        except SystemExit as end:
+            return end.code or 0
+    return 0
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=label)
-def test_examples_run_and_say_something(example: Path) -> None:
-    assert len(example.read_text(encoding="utf-8").splitlines()) <= 40
-    command = [sys.executable, label(example), *ARGUMENTS.get(example.name, [])]
+def test_examples_run_and_say_something(
+    example: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = example.read_text(encoding="utf-8")
+    assert len(code.splitlines()) <= 40
+    assert run_as_main(code, example, ARGUMENTS.get(example.name, []), monkeypatch) == 0
+    assert capsys.readouterr().out.strip()
+
+
+def test_an_example_runs_in_a_python_of_its_own() -> None:
+    command = [sys.executable, "examples/hello_controller.py"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
     assert run.returncode == 0, run.stderr
     assert run.stdout.strip()
 
 
-def test_the_comparison_exits_with_1_above_its_tolerance() -> None:
-    code = (ROOT / "examples" / "compare_to_nullspace.py").read_text(encoding="utf-8")
+def test_the_comparison_exits_with_1_above_its_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+    example = ROOT / "examples" / "compare_to_nullspace.py"
+    code = example.read_text(encoding="utf-8")
     strict = code.replace("TOLERANCE = 1e-8", "TOLERANCE = 0.0")  # rounding alone exceeds this
     assert strict != code
-    command = [sys.executable, "-c", strict, "36"]
-    assert subprocess.run(command, cwd=ROOT, capture_output=True, check=False, timeout=300).returncode == 1
+    assert run_as_main(strict, example, ["36"], monkeypatch) == 1
