@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from qpsafe.cli.outputs import try_file
 from qpsafe.danger.field import DangerField
 from qpsafe.robot.wire import Wire
 
@@ -54,6 +55,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=20_000)
     parser.add_argument("--out", type=Path, help="write the result to this file")
     arguments = parser.parse_args()
+    if arguments.out:
+        try_file("bench_danger_field", "--out", arguments.out)
     result = bench(arguments.repeats)
     print(f"{result['name']}: {POINTS} points x {LINKS} links, {result['repeats']} calls")
     print(f"  median {result['median_us']:.1f} µs   p99 {result['p99_us']:.1f} µs   max {result['max_us']:.1f} µs")

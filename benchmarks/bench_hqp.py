@@ -21,6 +21,7 @@ import numpy as np
 from hqp_exact import solve_exactly
 from hqp_family import KINDS, Hierarchy, drift, family
 
+from qpsafe.cli.outputs import try_file
 from qpsafe.hqp.cascade import solve_cascade
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.native_daqp import arrange, call_daqp
@@ -271,6 +272,8 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, help="also write the result to this file")
     arguments = parser.parse_args()
+    if arguments.out:
+        try_file("bench_hqp", "--out", arguments.out)
     from qpsafe.timing import machine
 
     a = arguments

@@ -18,6 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from qpsafe.cli.outputs import try_file
 from qpsafe.sim.irc5_compare import stream_process
 from qpsafe.timing import machine
 from qpsafe.words import growth
@@ -83,6 +84,8 @@ def main() -> None:
     parser.add_argument("--real-time", choices=("no", "yes"), nargs="+", default=["no", "yes"])
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
+    if arguments.out:
+        try_file("bench_stream", "--out", arguments.out)
     results = []
     print("; ".join(f"{key}: {value}" for key, value in machine().items() if key in ("processor", "system", "python")))
     for real_time in arguments.real_time:

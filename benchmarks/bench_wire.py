@@ -15,6 +15,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.realtime import fifo
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5_compare import Course, agreement, in_one_process, over_the_wire
@@ -30,6 +31,8 @@ def main() -> None:
     parser.add_argument("--only-lock-step", action="store_true", help="nothing that needs an idle computer")
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
+    if arguments.out:
+        try_file("bench_wire", "--out", arguments.out)
     name, duration, cycles = arguments.experiment, arguments.duration, arguments.cycles
     robot, settings = load_robot("irb140"), EgmSettings(ramp_in=0.05)
     here = in_one_process(name, robot, duration, settings, cycles=cycles)

@@ -21,6 +21,7 @@ from random import Random
 
 import numpy as np
 
+from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.inbox import REFUSALS
 from qpsafe.irc5.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
 from qpsafe.irc5.session import EgmSession
@@ -258,6 +259,8 @@ def main() -> None:
     parser.add_argument("--corpus", help=argparse.SUPPRESS)
     parser.add_argument("--out", type=Path, help="write the report to this file")
     arguments = parser.parse_args()
+    if arguments.out:
+        try_file("fuzz_egm", "--out", arguments.out)
     if arguments.atheris:
         sys.exit(fuzz_by_coverage(arguments.atheris, arguments.corpus))
     report = fuzz(arguments.datagrams, arguments.seed, progress=True)

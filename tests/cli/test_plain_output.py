@@ -63,6 +63,13 @@ def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch, capsy
         assert set(HOSTILE.split()) | {"0/1234567"} <= set(text.split())
 
 
+def test_json_is_a_flag_of_every_command() -> None:
+    for words, command in COMMANDS:
+        names = {name: parameter for parameter in command.params for name in parameter.opts}
+        if not getattr(command, "commands", {}):
+            assert names["--json"].is_flag, words
+
+
 # Colour
 
 COLOUR = re.compile(r"\x1b\[[\d;]*m")

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import ast
-import io
 import re
 import shutil
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from rich.cells import cell_len
 from rich.console import Console
-from rich.text import Text
 
 import qpsafe.cli
 from qpsafe.cli import (
@@ -44,53 +40,6 @@ from qpsafe.robot.loader import load_robot
 
 HOSTILE = "arm[/x] [red]b[/] :smile: [0m]"
 WIDTHS = (60, 80)
-
-
-# Sheets
-
-words = st.text(st.sampled_from("ab1.[]/:+-"), min_size=1, max_size=9)
-cells = st.lists(words, min_size=1, max_size=4).map(" ".join)
-
-
-def shown(sheet: Sheet, width: int) -> str:
-    out = io.StringIO()
-    Console(file=out, width=width, markup=False, emoji=False, highlight=False).print(sheet)
-    return out.getvalue()
-
-
-def check(sheet: Sheet, text: str, width: int) -> None:
-    """Every word is there, as often as in the cells; numbers are in one piece; nothing is wider than the screen."""
-    assert "…" not in text
-    assert max(map(cell_len, text.splitlines())) <= width
-    found = Counter(word.rstrip(";") for word in text.split())
-    plain = [cell.plain for row in sheet.rows for cell in row]
-    assert not Counter(" ".join(plain).split()) - found
-    heads = Counter(word.rstrip(":") for word in found)
-    assert not {word.rstrip(":") for word in " ".join([sheet.title, *sheet.headings]).split()} - set(heads)
-    for row in sheet.rows:
-        for number, cell in enumerate(row):
-            if number not in sheet.text:
-                assert all(line.strip() in text for line in cell.plain.split("\n"))
-
-
-@given(data=st.data(), width=st.integers(44, 120))
-def test_no_word_of_a_sheet_is_lost_or_cut(data: st.DataObject, width: int) -> None:
-    count = data.draw(st.integers(1, 9))
-    row = st.lists(words | cells, min_size=count, max_size=count)
-    text = data.draw(st.sets(st.integers(0, count - 1)))
-    sheet = Sheet(data.draw(cells), data.draw(row), text)
-    for line in data.draw(st.lists(row, min_size=1, max_size=4)):
-        sheet.add_row(*(cell if number in text else Text(cell.split()[0]) for number, cell in enumerate(line)))
-    check(sheet, shown(sheet, width), width)
-
-
-def test_a_sheet_is_a_table_where_it_fits_and_never_wraps_a_number() -> None:
-    sheet = Sheet("t", ("what", "first number [mm]", "second [1/s]"))
-    sheet.add_row("a name of several words", "1 234.5 %", "-0.25")
-    assert "1 234.5 %" in shown(sheet, 80).splitlines()[3]
-    assert "first number [mm]: 1 234.5 %" in shown(sheet, 32)
-    with pytest.raises(ValueError, match="2 cells for 3"):
-        sheet.add_row("a", "b")
 
 
 # Every table of every command
@@ -299,29 +248,37 @@ def test_no_table_is_forgotten_and_none_is_made_otherwise() -> None:
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("show", dict.fromkeys(TABLES.values()), ids=lambda show: show.__name__)
 def test_every_table_is_whole_on_a_narrow_screen(
-    show: Show, width: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    show: Show,
+    width: int,
+    whole: Callable[[Sheet, int], str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    sheets: list[tuple[Sheet, str]] = []
-    original = Sheet.__rich_console__
-
-    def kept(sheet: Sheet, console: Console, options: Any) -> Any:
-        sheets.append((sheet, shown_by(sheet, options.max_width)))
-        yield from original(sheet, console, options)
-
-    def shown_by(sheet: Sheet, width: int) -> str:
-        with monkeypatch.context() as patch:
-            patch.setattr(Sheet, "__rich_console__", original)
-            return shown(sheet, width)
-
-    monkeypatch.setattr(Sheet, "__rich_console__", kept)
+    sheets: list[Sheet] = []
+    monkeypatch.setattr(common, "console", partial(_recording, common.console, sheets))
+    for module in (robots, story):  # what makes its own screen
+        monkeypatch.setattr(module, "console", common.console)
     monkeypatch.setenv("COLUMNS", str(width))
     show(common.console(False), tmp_path)
     text = capsys.readouterr().out
     assert sheets
-    for sheet, alone in sheets:
-        check(sheet, alone, width)
-        assert alone in text
+    for sheet in sheets:
+        assert whole(sheet, width) in text
     assert max(map(cell_len, text.splitlines())) <= width
+
+
+def _recording(make: Callable[[bool], Console], sheets: list[Sheet], json: bool) -> Console:
+    """A screen that keeps the tables printed on it."""
+    screen = make(json)
+    write = screen.print
+
+    def kept(*objects: Any, **options: Any) -> None:
+        sheets.extend(item for item in objects if isinstance(item, Sheet))
+        write(*objects, **options)
+
+    screen.print = kept  # type: ignore[method-assign]
+    return screen
 
 
 @pytest.mark.parametrize("show", [of_inspect, of_story, of_fixed, of_place])
