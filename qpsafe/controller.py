@@ -29,13 +29,12 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits
 from qpsafe.parts import Parts
-from qpsafe.quick import Quick
 from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.reference import JointReference
-from qpsafe.resolve import Resolved, judged, resolve
+from qpsafe.resolve import Resolve, Resolved, judged
 from qpsafe.returns import GentleLimits
 from qpsafe.robot.state import RobotState
-from qpsafe.sense import sense
+from qpsafe.sense import Sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -112,7 +111,9 @@ class SafetyController(Parts):
         self._units = UnitWatch(self._spots, self._dt)
         self.barrier = barrier
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
-        self._quick, self._gentle = Quick(robot), GentleLimits(self._recovery_rules.acceleration)
+        self._gentle = GentleLimits(self._recovery_rules.acceleration)
+        self._sense = Sense(robot, self._sensing, self._field, self._evasion)
+        self._resolve = Resolve(robot, self._tasks, self._law)
         self.reset()
 
     def reset(self) -> None:
@@ -227,11 +228,8 @@ class SafetyController(Parts):
             self._qd = self._qd_before = np.zeros(self._robot.nq)
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        tasks, barrier, recovery = self._tasks, self._barrier, self._recovery
-        parts = self._sensing, self._field, self._evasion
-        seen = None if barrier is not None else self._quick.sensed(q, qd, distances, points, ages, *parts)
-        if seen is None:
-            seen = sense(self._robot, q, qd, distances, points, ages, *parts)
+        barrier, recovery = self._barrier, self._recovery
+        seen = self._current_sense()(q, qd, distances, points, ages)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
@@ -243,20 +241,16 @@ class SafetyController(Parts):
         limits, qdd = self._limits, (self._qd - self._qd_before) / self._dt
         if recovery.phase == RECOVERING and limits is not None:
             limits = self._gentle.choose(limits, self._q, self._qd, qdd)
-        resolver = None if barrier is not None else self._quick.resolver(tasks, self._law, limits)
-        resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
-        if resolved is None:
-            box = None if limits is None else limits.box(self._q, self._qd, qdd)
-            level = barrier and barrier.level(seen.measured, self._qd, seen.points, seen.danger)
-            soft = (level,) if level else ()
-            resolved = resolve(commanded, tasks, samples, qd0, activations, self._law, box, soft, self._dt)
-            command = resolved.command
-            if barrier is not None:  # exact, as far as the acceleration limits allow
-                command = barrier.scale(seen.measured, command, seen.points).factor * command
-                command = command if box is None else box.clip(command)
-            check_command(command, self._dt)  # whatever limits and barriers of another making do to it
-        else:
-            command = resolved.command
+        measured = None if barrier is None else self._robot.at(as_joint_position(q, self._robot))
+        level = barrier and barrier.level(measured, self._qd, seen.points, seen.danger)
+        resolved = self._current_resolve()(
+            commanded, self._qd, qdd, samples, qd0, activations, limits, (level,) if level else (), self._dt
+        )
+        command = resolved.command
+        if barrier is not None:  # exact, as far as the acceleration limits allow
+            command = barrier.scale(measured, command, seen.points).factor * command
+            command = command if resolved.box is None else resolved.box.clip(command)
+            check_command(command, self._dt)
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
@@ -281,8 +275,22 @@ class SafetyController(Parts):
             waits_for=recovery.waits_for,
             joint_names=self._robot.joint_names,
             resolved=resolved,
-            off_path=None if recovery.on_path else _errors(tasks, commanded, recovery.path_time),
+            off_path=None if recovery.on_path else _errors(self._tasks, commanded, recovery.path_time),
         )
+
+    def _current_sense(self) -> Sense:
+        """The first half of a tick with the present parts."""
+        sensing, field, evasion = self._sense.parts
+        if not (sensing is self._sensing and field is self._field and evasion is self._evasion):
+            self._sense = Sense(self._robot, self._sensing, self._field, self._evasion)
+        return self._sense
+
+    def _current_resolve(self) -> Resolve:
+        """The second half of a tick with the present parts."""
+        tasks, law = self._resolve.parts
+        if not (tasks is self._tasks and law is self._law):
+            self._resolve = Resolve(self._robot, self._tasks, self._law)
+        return self._resolve
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
@@ -308,7 +316,7 @@ class SafetyController(Parts):
             qd0=qd0,
             path_time=self._recovery.path_time,
             joint_names=self._robot.joint_names,
-            resolved=Resolved(slower, 0.0, False, box, None, ()),
+            resolved=Resolved(slower, 0.0, False, box),
         )
 
     def _reference(self, command: NDArray[np.float64]) -> JointReference:

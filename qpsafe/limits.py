@@ -86,7 +86,7 @@ class JointLimits(Fixed):
         ConfigurationError: Shapes differ, a number is NaN, lower > upper, a rate is not positive, or one is changed.
     """
 
-    fixed = frozenset(("lower", "upper", "max_velocity", "max_acceleration", "dt", "return_speed", "max_jerk"))
+    fixed = frozenset(("lower", "upper", "max_velocity", "max_acceleration", "dt", "return_speed", "max_jerk", "table"))
 
     def __init__(
         self,
@@ -116,6 +116,8 @@ class JointLimits(Fixed):
             value = np.asarray(getattr(self, key))
             if not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
+
+        self.table = np.array((self.lower, self.upper, self.max_velocity, self.max_acceleration))  # for compiled code
 
     @classmethod
     def of(cls, robot: Robot, dt: float = 0.004) -> JointLimits:

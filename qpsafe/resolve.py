@@ -1,13 +1,13 @@
-"""The second half of a tick in one compiled call, where all of it is of the built-in kind: tasks, limits, law.
+"""The second half of a tick: from references and q̇0 to the command.
 
-    tasks on poses --CLIK--> J, ẋ;   limits --> box;   J, ẋ, q̇0, weights, box --regimes--> q̇;   q̇ --box--> command
+    tasks --CLIK--> J, ẋ;   limits --> box;   J, ẋ, q̇0, activations, box --law--> q̇;   q̇ --box--> command
 
-`resolve` says it in plain words, for tasks, laws and limits of any kind; `Resolver` computes the same.
+One compiled call, see `qpsafe.resolve_kernel`. A task, limits or a law of another making takes the place of its stage;
+the others stay the compiled ones.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 from time import perf_counter
@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.checks import checked_velocity
-from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.resolve_kernel import Parts, parts, resolve_quickly
+from qpsafe.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.tasks.task import PoseTask
 
 if TYPE_CHECKING:
@@ -33,68 +32,192 @@ if TYPE_CHECKING:
     from qpsafe.laws.problem import Law
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
+    from qpsafe.tasks.clik import Clik
     from qpsafe.tasks.task import Task
 
 Array = NDArray[np.float64]
 _FLOAT = np.dtype(np.float64)
 
 
-@dataclass
 class Resolved:
-    """What is to be done in a tick.
+    """What is to be done in a tick; explained, from numbers that stay, when it is looked at.
 
-    Attributes:
+    Args:
         command: Joint velocity (n,) [rad/s], inside the box.
         excess: By how much the law's answer was outside; NaN if a limit gave way.
         solved: Whether the law answered as planned.
-        box: Admissible velocities.
-        result: The law's answer; None if it was not asked.
-        errors: Of the tasks against their references of this tick.
+        box: Admissible velocities, if they are known already.
+        result: The law's answer, likewise.
+        frozen: Else they are made from the results of `resolve_tick`, the evasive velocity, the regimes' weights, the
+            rows of each task, the time it took [s], and whether there are limits.
     """
 
-    command: Array
-    excess: float
-    solved: bool
-    box: Box | None
-    result: LawResult | None
-    errors: tuple[Array, ...]
+    def __init__(
+        self, command: Array, excess: float, solved: bool, box: Box | None = None, result: LawResult | None = None,
+        frozen: tuple[Any, ...] | None = None,
+    ) -> None:  # fmt: skip
+        self.command, self.excess, self.solved = command, excess, solved
+        self._box, self._result, self._frozen = box, result, frozen
+
+    @cached_property
+    def _parts(self) -> Parts:
+        assert self._frozen is not None
+        floats, integers, _, weights, counts, _, _ = self._frozen
+        return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
+
+    @cached_property
+    def box(self) -> Box | None:
+        """Admissible velocities; None without limits."""
+        if self._frozen is None or not self._frozen[-1]:
+            return self._box
+        return Box(*self._parts.bounds, *self._parts.codes)
+
+    @cached_property
+    def result(self) -> LawResult | None:
+        """The law's answer; None if it was not asked."""
+        if self._result is not None or self._frozen is None:
+            return self._result
+        cut, (_, _, qd0, weights, counts, taken, _) = self._parts, self._frozen
+        data = (cut.A, cut.b, qd0, *cut.bounds)
+        return BlendResult(cut.blend, cut.x, cut.info, weights, data, counts, taken, self.solved)
+
+    @cached_property
+    def errors(self) -> tuple[Array, ...]:
+        """Of the tasks against their references of this tick, (rows,) each."""
+        if self._frozen is None:
+            return ()
+        return tuple([self._parts.e[first:last] for first, last in pairwise([0, *accumulate(self._frozen[4])])])
 
 
-def resolve(
-    commanded: RobotState,
-    tasks: Sequence[Task],
-    samples: Sequence[Any],
-    qd0: Array,
-    activations: tuple[float, ...],
-    law: Law,
-    box: Box | None,
-    soft: tuple[Level, ...],
-    dt: float,
-) -> Resolved:
-    """Tasks, limits and law one after the other, of any kind.
+class Resolve:
+    """Resolves ticks with one set of tasks and one law; whoever exchanges them makes another `Resolve`.
 
     Args:
-        commanded: Commanded configuration.
+        robot: The robot.
         tasks: Highest priority first.
-        samples: Their references.
-        qd0: Evasive velocity (n,) [rad/s].
-        activations: Of the tasks.
         law: The law.
-        box: Admissible velocities, or None.
-        soft: Levels under the limits.
-        dt: Tick [s].
+    """
 
-    Raises:
-        ValueError, TypeError: What the law returned could not be sent to a robot.
-    """  # fmt: skip
-    wanted = [task.clik(commanded, sample) for task, sample in zip(tasks, samples, strict=True)]
-    wishes = tuple([TaskVelocity(jacobian, velocity) for jacobian, velocity, _ in wanted])
-    lower, upper = (box.lower.copy(), box.upper.copy()) if box else (None, None)
-    result = law.solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
-    answer = checked_velocity(result, commanded.q, dt)
-    command, excess = box.admit(answer) if box else (answer.copy(), 0.0)
-    errors = tuple([np.array(clik.error) for clik in wanted])  # as they are now, whatever becomes of the task's arrays
-    return Resolved(command, excess, result.status == SOLVED, box, result, errors)
+    def __init__(self, robot: Robot, tasks: Sequence[Task], law: Law) -> None:
+        self.parts = tasks, law
+        self._robot = robot
+        #: Rows of each task that the compiled call fills in, None for the others.
+        self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
+        own = type(law) is HierarchicalLaw and law.solver in (None, "own")
+        self._ours = own and (law.projection == "strict" or len(tasks) == 1)  # type: ignore[attr-defined]
+        self._block = np.zeros(24 * len(tasks) + 1 + robot.nq)
+        self._gains, self._goals, self._twists, self._weights, self._qd0 = given(self._block, robot.nq, len(tasks))
+        nowhere = (0, np.eye(4))
+        mountings = [
+            robot.mounting(task.frame) if isinstance(task, PoseTask) and rows is not None else nowhere
+            for task, rows in zip(tasks, self._rows, strict=True)
+        ]
+        self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
+        self._layouts: dict[tuple[int, ...], tuple[Any, ...]] = {}
+
+    def __call__(
+        self, state: RobotState, qd: Array, qdd: Array, samples: Sequence[Any], qd0: Array,
+        activations: tuple[float, ...], limits: JointLimits | None, soft: tuple[Level, ...] = (), dt: float = 0.004,
+    ) -> Resolved:  # fmt: skip
+        """Resolve one tick.
+
+        Args:
+            state: Commanded configuration.
+            qd: Commanded velocity (n,) [rad/s].
+            qdd: Acceleration that led to it (n,) [rad/s²].
+            samples: Reference of every task.
+            qd0: Evasive velocity (n,) [rad/s].
+            activations: Of the tasks.
+            limits: Joint limits, or None.
+            soft: Levels under the limits.
+            dt: Tick [s].
+
+        Raises:
+            ValueError, TypeError: What a part returned could not be sent to a robot.
+        """  # fmt: skip
+        begin = perf_counter()
+        counts, asked = self._take(state, samples)
+        made = self._layouts.get(counts)
+        if made is None:
+            made = self._layouts[counts] = self._laid_out(counts)
+        rows, layout, sizes = made
+        command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
+        plain = type(limits) is JointLimits and limits.max_jerk is None
+        if asked or not plain:
+            box = None if plain or limits is None else limits.box(state.q, qd, qdd)
+            self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
+        table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
+        ours = self._ours and limits is not None and not soft
+        self._weights[:] = weights = weights_of(activations)
+        self._qd0[:] = qd0
+        excess, worst = resolve_tick(
+            state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
+            table, dt, return_speed, self.parts[1].damping if ours else np.nan, *layout, floats, integers, command,
+        )  # fmt: skip
+        if excess < 0.0:
+            raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
+        frozen = (floats, integers, qd0, weights, counts, perf_counter() - begin, limits is not None)
+        if ours:
+            return Resolved(command, excess, worst == 0.0, frozen=frozen)
+        return self._by_law(Resolved(command, 0.0, False, frozen=frozen), state, activations, soft, dt)
+
+    def _take(self, state: RobotState, samples: Sequence[Any]) -> tuple[tuple[int, ...], dict[int, Clik]]:
+        """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
+        asked: dict[int, Clik] = {}
+        counts = []
+        for k, (task, rows, sample) in enumerate(zip(self.parts[0], self._rows, samples, strict=True)):
+            if rows is not None:
+                pose, twist = sample.pose, sample.twist
+                if (
+                    type(pose) is type(twist) is np.ndarray
+                    and pose.dtype is twist.dtype is _FLOAT
+                    and pose.shape == (4, 4)
+                    and twist.shape == (6,)
+                ):
+                    self._goals[k], self._twists[k], self._gains[k] = pose, twist, task.gain
+                    counts.append(len(rows))
+                    continue
+            self._gains[k] = np.nan
+            asked[k] = task.clik(state, sample)
+            counts.append(len(asked[k].velocity))
+        return tuple(counts), asked
+
+    def _laid_out(self, counts: tuple[int, ...]) -> tuple[Any, ...]:
+        """For tasks of these numbers of rows: which rows of a pose each is, memory of the solver, sizes of results."""
+        kinds = [rows if rows is not None else (0,) * count for rows, count in zip(self._rows, counts, strict=True)]
+        rows = np.array([row for kind in kinds for row in kind], dtype=np.int64)
+        n = self._robot.nq
+        return rows, layout_for(n, counts), sizes_of(n, len(rows), len(counts) + 1)
+
+    @staticmethod
+    def _fill(cut: Parts, asked: dict[int, Clik], counts: tuple[int, ...], box: Box | None) -> None:
+        """Write down what parts of another making answered."""
+        ends = [0, *accumulate(counts)]
+        for k, clik in asked.items():
+            rows = slice(ends[k], ends[k + 1])
+            if np.shape(clik.jacobian) != cut.A[rows].shape or np.shape(clik.error) != (counts[k],):
+                shapes = f"{np.shape(clik.jacobian)}, {np.shape(clik.velocity)}, {np.shape(clik.error)}"
+                raise ValueError(f"task {k + 1} gave Jacobian, velocity and error of shapes {shapes}")
+            cut.A[rows], cut.b[rows], cut.e[rows] = clik
+        if box is not None:
+            cut.bounds[0], cut.bounds[1] = box.lower, box.upper
+            cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
+
+    def _by_law(
+        self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...], dt: float
+    ) -> Resolved:
+        """Ask a law of another making, or for what the compiled call does not know."""
+        cut, (_, _, qd0, _, counts, _, limited) = made._parts, made._frozen  # type: ignore[misc]
+        pairs = list(pairwise([0, *accumulate(counts)]))
+        wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
+        lower, upper = cut.bounds.copy() if limited else (None, None)
+        result = self.parts[1].solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
+        answer = checked_velocity(result, state.q, dt)
+        command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
+        return Resolved(command, excess, result.status == SOLVED, result=result, frozen=made._frozen)
+
+
+_NO_LIMITS = np.empty((0, 0))
 
 
 def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -109,115 +232,3 @@ def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
             clipped = ", ".join(name for name, much in zip(names, beyond, strict=True) if much)
             messages = (*messages, "the law exceeded the limits, clipped: " + clipped)
     return messages if resolved.solved else (*messages, f"law: {result.status}")
-
-
-class Resolver:
-    """Resolves ticks of one set of tasks.
-
-    Args:
-        robot: The robot.
-        tasks: Tasks on poses, all of the built-in kind.
-        law: The law.
-        limits: The limits.
-    """
-
-    def __init__(self, robot: Robot, tasks: Sequence[PoseTask], law: HierarchicalLaw, limits: JointLimits) -> None:
-        counts = tuple(len(task.rows) for task in tasks)
-        self._tasks, self._law, self._counts = tuple(tasks), law, counts
-        mountings = [robot.mounting(task.frame) for task in tasks]
-        self._tables = (
-            robot.tree.supports,
-            robot.ends,
-            np.array([body for body, _ in mountings], dtype=np.int64),
-            np.array([placement for _, placement in mountings]),
-            np.array([row for task in tasks for row in task.rows], dtype=np.int64),
-            np.array((limits.lower, limits.upper, limits.max_velocity, limits.max_acceleration)),
-            limits.dt,
-            limits.return_speed,
-        )
-        self._goals, self._twists = np.empty((len(tasks), 4, 4)), np.empty((len(tasks), 6))
-        self._gains = np.empty(len(tasks))
-        self._layout = layout_for(robot.nq, counts)
-        n, rows, kinds = robot.nq, sum(counts), len(tasks) + 1
-        self._weights = np.empty(kinds)
-        self._floats = rows * n + 2 * rows + (3 + kinds) * n  # of `parts`
-        self._integers = 3 * n + kinds * (HEADER + 2 * n + rows)
-
-    @staticmethod
-    def fits(tasks: Sequence[Task], law: Any, limits: Any) -> bool:
-        """Whether everything is of the kind that the compiled call knows."""
-        return (
-            type(limits) is JointLimits
-            and limits.max_jerk is None
-            and type(law) is HierarchicalLaw
-            and law.solver in (None, "own")
-            and (law.projection == "strict" or len(tasks) == 1)
-            and all(isinstance(task, PoseTask) and task.plain for task in tasks)
-        )
-
-    def __call__(
-        self, state: RobotState, qd: Array, samples: Sequence[Any], qd0: Array, activations: tuple[float, ...]
-    ) -> Resolved | None:
-        """Resolve one tick; None where a sample is not made of plain arrays.
-
-        Args:
-            state: Commanded configuration.
-            qd: Commanded velocity (n,) [rad/s].
-            samples: Reference of every task.
-            qd0: Evasive velocity (n,) [rad/s].
-            activations: Of the tasks.
-        """
-        begin = perf_counter()
-        goals, twists, gains, weights = self._goals, self._twists, self._gains, self._weights
-        for k, sample in enumerate(samples):
-            pose, twist = sample.pose, sample.twist
-            if not (type(pose) is type(twist) is np.ndarray and pose.dtype is twist.dtype is _FLOAT):
-                return None
-            if pose.shape != (4, 4) or twist.shape != (6,):
-                return None
-            goals[k], twists[k], gains[k] = pose, twist, self._tasks[k].gain
-        weights[:] = given = weights_of(activations)
-        command, floats, integers = np.empty(len(qd)), np.zeros(self._floats), np.zeros(self._integers, dtype=np.int64)
-        excess, worst = resolve_quickly(
-            state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, weights, self._law.damping,
-            *self._layout, floats, integers, command,
-        )  # fmt: skip
-        if excess < 0.0:
-            raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
-        taken = perf_counter() - begin
-        return QuicklyResolved(command, excess, worst == 0.0, (floats, integers, qd0, given, self._counts, taken))
-
-
-class QuicklyResolved(Resolved):
-    """`Resolved` by one compiled call: the arrays it filled are cut, and explained, when they are looked at.
-
-    Args:
-        command, excess, solved: As for `Resolved`.
-        filled: Results of `resolve_quickly`, the evasive velocity, the regimes' weights, rows of each task, time [s].
-    """
-
-    def __init__(self, command: Array, excess: float, solved: bool, filled: tuple[Any, ...]) -> None:
-        self.command, self.excess, self.solved, self._filled = command, excess, solved, filled
-
-    @cached_property
-    def _parts(self) -> Parts:
-        floats, integers, _, weights, counts, _ = self._filled
-        return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
-
-    @cached_property
-    def box(self) -> Box:  # type: ignore[override]
-        """Admissible velocities."""
-        return Box(*self._parts.bounds, *self._parts.codes)
-
-    @cached_property
-    def result(self) -> LawResult:  # type: ignore[override]
-        """The law's answer."""
-        cut, (_, _, qd0, weights, counts, taken) = self._parts, self._filled
-        data = (cut.A, cut.b, qd0, *cut.bounds)
-        return BlendResult(cut.blend, cut.x, cut.info, weights, data, counts, taken, self.solved)
-
-    @cached_property
-    def errors(self) -> tuple[Array, ...]:  # type: ignore[override]
-        """Of the tasks."""
-        ends = [0, *accumulate(self._filled[4])]
-        return tuple([self._parts.e[first:last] for first, last in pairwise(ends)])

@@ -1,4 +1,9 @@
-"""The compiled half of `qpsafe.resolve`: tasks on poses, joint limits and all regimes of the law in one call."""
+"""The compiled stages of the second half of a tick, and the call they are composed to.
+
+    tasks on poses --CLIK--> J, ẋ;   limits --> box;   J, ẋ, q̇0, weights, box --regimes--> q̇;   q̇ --box--> command
+
+A stage of another making has been asked before: rows of a task, or a box, that stand in the results already.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +27,7 @@ from qpsafe.tasks.clik import pose_rows
 
 
 class Parts(NamedTuple):
-    """Results of `resolve_quickly`; n joints, a regime more than tasks.
+    """Results of `resolve_tick`; n joints, a regime more than tasks.
 
     Attributes:
         A: Jacobians of the tasks (rows, n).
@@ -62,45 +67,84 @@ def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tupl
     )
 
 
-_cut = inline(parts)
+def sizes_of(n: int, rows: int, kinds: int) -> tuple[int, int]:
+    """How many floats and integers these are."""
+    return rows * n + 2 * rows + (3 + kinds) * n, 3 * n + kinds * (HEADER + 2 * n + rows)
+
+
+def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
+    """Cut from a block what changes every tick: gains (tasks,), NaN where the rows stand already; goals (tasks, 4, 4);
+    twists (tasks, 6); weights of the regimes (tasks + 1,); q̇0 (n,)."""
+    return (
+        view(block, 0, (tasks,)),
+        view(block, tasks, (tasks, 4, 4)),
+        view(block, 17 * tasks, (tasks, 6)),
+        view(block, 23 * tasks, (tasks + 1,)),
+        view(block, 24 * tasks + 1, (n,)),
+    )
+
+
+_cut, _given = inline(parts), inline(given)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
-_any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
+_any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.float64[::1], types.int64[::1]
 
 
 @entry(
     types.UniTuple(types.float64, 2)(
-        _any, _any, _one, _two, types.int64, _ints, _three, _ints, readable(2), types.float64, types.float64,
-        _one, readable(3), readable(2), _one, _one, types.float64,
-        types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
-        _ints, types.float64[::1], types.int64[::1], types.float64[::1],
+        _any, _any, _one, _two, types.int64, _ints, _three, _ints, types.float64[::1], readable(2), types.float64,
+        types.float64, types.float64,
+        _out, _out_ints, types.int64, types.float64[:, ::1], _out, _out_ints, _ints, _out, _out_ints, _out,
     ),
     kinematics, clik, limits_module, own_regimes, *MODULES,
 )  # fmt: skip
-def resolve_quickly(
+def resolve_tick(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
-    limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
-    weights: Array, damping: float, work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index,
-    ends: Index, floats: Array, integers: Index, command: Array,
+    block: Array, limits: Array, dt: float, return_speed: float, damping: float,
+    work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index,
+    floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Fill floats and integers (zeros; see `Parts`), command; returns excess, -1 if q̇ is absurd, and the worst code."""
-    A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, q.shape[0], rows.shape[0], weights.shape[0])
-    poses, axes, _, _ = cut(memory, q.shape[0], k)
+    """Fill floats and integers (see `Parts`), command.
+
+    Args:
+        q, qd, memory: Commanded position, velocity (n,), and kinematics.
+        supports, k: Of the robot's tree, and ends of its wire.
+        bodies, placements, rows: Of the tasks' frames (tasks,), (tasks, 4, 4); of all their rows which of x, y, z, and
+            the rotation about them (rows,).
+        block: What `given` cuts.
+        limits: Lower, upper, velocity, acceleration (4, n), or (0, n) where the box stands already.
+        dt, return_speed: Of the limits.
+        damping: Of the law; NaN where the law is of another making and will be asked afterwards.
+        work, int_work, m, matrix, target, last, ends: A `Layout` of the solver.
+        floats, integers: Results, zeros but for what stands already.
+        command: (n,), q̇ inside the box.
+
+    Returns:
+        By how much the law's q̇ was outside, -1 if it is absurd; the worst code of the solver.
+    """  # fmt: skip
+    n, tasks = q.shape[0], bodies.shape[0]
+    A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, n, rows.shape[0], tasks + 1)
+    gains, goals, twists, weights, qd0 = _given(block, n, tasks)
+    poses, axes, _, _ = cut(memory, n, k)
     # CLIK: ẋ = ẋ_d + K e
-    for t in range(bodies.shape[0]):
+    for t in range(tasks):
         first, stop = (ends[t - 1] if t > 0 else 0), ends[t]
-        pose_rows(
-            poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
-            twists[t], A[first:stop], b[first:stop], e[first:stop],
-        )  # fmt: skip
-    # limits -> box; regimes of the law within it, blended
-    box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
+        if gains[t] == gains[t]:
+            pose_rows(
+                poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
+                twists[t], A[first:stop], b[first:stop], e[first:stop],
+            )  # fmt: skip
+    if limits.shape[0] > 0:
+        box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
+    if damping != damping:
+        return 0.0, 0.0
+    # regimes of the law within the box, blended
     solve_regimes(
         work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
         blend,
     )  # fmt: skip
     # checked: finite, sane, inside the box
     sane = True
-    for i in range(blend.shape[0]):
+    for i in range(n):
         command[i] = blend[i]
         sane = sane and abs(blend[i]) * dt < ABSURD_STEP  # false for NaN
     if not sane:

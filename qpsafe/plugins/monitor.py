@@ -17,7 +17,14 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits, checked_limits
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
-from qpsafe.sensing.detection import BadInput, as_detection, as_joint_position, as_joint_velocity
+from qpsafe.sensing.detection import (
+    BadInput,
+    as_joint_position,
+    as_joint_velocity,
+    as_points,
+    find_nearest,
+    refuse_points,
+)
 from qpsafe.tasks.trajectory import checked_pose
 from qpsafe.tick import BAD_INPUT, OK
 
@@ -117,16 +124,19 @@ class DangerMonitor:
         wire = state.wire(qd)
         if self._base is not None:
             points = _into(self._base, points)
-        seen = as_detection(state, wire, None, None, points)
-        danger, gradient = self.field.evaluate(seen.points, wire)  # (5)
+        points = as_points(points).copy()
+        links = np.empty(len(points), dtype=np.int64)
+        if not find_nearest(points, wire.starts, wire.ends, links):
+            refuse_points(points)
+        danger, gradient = self.field.evaluate(points, wire)  # (5)
         vectors = danger_vectors(danger, gradient)  # (6)
-        forces = link_vectors(vectors, seen.links, len(self.robot.wire_frames))  # (8)
+        forces = link_vectors(vectors, links, len(self.robot.wire_frames))  # (8)
         torque = virtual_torque(state, forces)  # (14), (15)
         if not (np.isfinite(danger).all() and np.isfinite(torque).all()):
             raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
         self.state: RobotState | None = state
         self._moving = qd
-        self.qd, self.points, self.danger = qd, seen.points, danger
+        self.qd, self.points, self.danger = qd, points, danger
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
         self.qd0 = self.evasion.step(torque).copy()  # (16)

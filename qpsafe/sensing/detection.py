@@ -1,10 +1,10 @@
-"""From raw input of one tick to the points that count, or a plain report of what is wrong with it."""
+"""Raw input of one tick as arrays that can be used, or a plain report of what is wrong with it."""
 
 from __future__ import annotations
 
 import functools
 from math import isfinite
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numba import types
@@ -12,35 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger import compiled
 from qpsafe.danger.compiled import Array, Vector, add, dot, entry, inline, readable, row
-from qpsafe.sensing.health import CLEAR
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.state import RobotState
     from qpsafe.robot.wire import Wire
-    from qpsafe.sensing.sensing import DistanceSensing
 
 
 class BadInput(Exception):
     """Input of one tick that cannot be used; caught inside `SafetyController.step`, which reports it."""
-
-
-class Detection(NamedTuple):
-    """Points that count in this tick.
-
-    Attributes:
-        points: (p, 3), world frame [m].
-        links: Wire link of each point, (p,), from 0.
-        velocities: Of the points (p, 3) [m/s], or None where they are taken as standing still.
-        notes: What is wrong with the sensors, in words.
-        capped: Whether the robot has to go slowly, since a sensor is dead.
-    """
-
-    points: NDArray[np.float64]
-    links: NDArray[np.int64]
-    velocities: NDArray[np.float64] | None = None
-    notes: tuple[str, ...] = ()
-    capped: bool = False
 
 
 _FLOAT = np.dtype(np.float64)
@@ -72,7 +51,7 @@ def plausible(robot: Robot) -> tuple[NDArray[np.float64], ...]:
 def _as_joint_vector(
     name: str, value: ArrayLike, lowest: NDArray[np.float64], highest: NDArray[np.float64], joints: tuple[str, ...]
 ) -> NDArray[np.float64]:
-    array = _as_floats(name, value)
+    array = as_floats(name, value)
     if array.shape != lowest.shape:
         raise BadInput(f"{name} has shape {array.shape}, expected {lowest.shape}")
     if not _all_between(lowest, array, highest):
@@ -92,74 +71,34 @@ def _all_between(lowest: Array, array: Array, highest: Array) -> bool:
     return good
 
 
-def as_detection(
-    state: RobotState,
-    wire: Wire,
-    sensing: DistanceSensing | None,
-    distances: ArrayLike | None,
-    points: ArrayLike | None,
-    ages: ArrayLike | None = None,
-) -> Detection:
-    """The detected points of one tick.
-
-    Args:
-        state: Robot at the measured joint position.
-        wire: Its wire model.
-        sensing: The distance sensors with what they remember, or None.
-        distances: One reading per spot (k,) [m], or points (p, 3), or None.
-        points: Points (p, 3) [m], or None.
-        ages: How old each distance is (k,), or one number for all [s].
+def refuse(q: ArrayLike, qd: ArrayLike, robot: Robot) -> NoReturn:
+    """Say what is wrong with a measurement that compiled code refused.
 
     Raises:
-        BadInput: Wrong shape; too many spots out of order; a point that is not finite; both or neither kind given:
-            silence is not safety, "nothing in sight" is said by distances of +inf or an empty list of points.
+        BadInput: Always.
     """
-    if distances is not None and points is not None:
-        raise BadInput("both distances and points are given, expected one of them")
-    if distances is not None:
-        array = _as_floats("distances", distances)
-        if array.ndim == 2 and array.shape[1] == 3:
-            return _from_points(wire, array)
-        return _from_distances(state, wire, sensing, array, ages)
-    if points is not None:
-        return _from_points(wire, _as_floats("points", points))
-    raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
+    as_joint_position(q, robot), as_joint_velocity(qd, robot)
+    raise BadInput("q or qd is no measurement")
 
 
-def _from_distances(
-    state: RobotState,
-    wire: Wire,
-    sensing: DistanceSensing | None,
-    distances: NDArray[np.float64],
-    ages: ArrayLike | None,
-) -> Detection:
-    if sensing is None:
-        raise BadInput("distances are given but the robot has no spots")
-    shape = (len(sensing.spots),)
-    if distances.shape != shape:
-        raise BadInput(f"distances have shape {distances.shape}, expected {shape}")
-    if ages is not None:
-        ages = _as_floats("ages", ages)
-        if ages.shape not in ((), shape):
-            raise BadInput(f"ages have shape {ages.shape}, expected {shape} or one number")
-        ages = np.broadcast_to(ages, shape)
-    seen = sensing.update(state, wire, distances, ages)
-    if seen.too_many:
-        raise BadInput("; ".join(seen.notes))
-    return Detection(seen.points, seen.links, seen.velocities, seen.notes, seen.severity != CLEAR)
-
-
-def _from_points(wire: Wire, points: NDArray[np.float64]) -> Detection:
+def as_points(value: ArrayLike) -> NDArray[np.float64]:
+    """Points (p, 3) [m], the caller's own array if it may be; or BadInput."""
+    points = as_floats("points", value)
     if points.shape == (0,):  # an empty list
         points = points.reshape(0, 3)
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInput(f"points have shape {points.shape}, expected (p, 3)")
-    points = points.copy()  # they go into the tick
-    links = np.empty(len(points), dtype=np.int64)
-    if not find_nearest(points, wire.starts, wire.ends, links):
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        raise BadInput("points are not finite: number " + ", ".join(str(i) for i in bad))
-    return Detection(points, links)
+    return points
+
+
+def refuse_points(points: NDArray[np.float64]) -> NoReturn:
+    """Say which points are not finite.
+
+    Raises:
+        BadInput: Always.
+    """
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    raise BadInput("points are not finite: number " + ", ".join(str(i) for i in bad))
 
 
 def nearest_link(points: NDArray[np.float64], wire: Wire) -> NDArray[np.int64]:
@@ -196,7 +135,7 @@ def find_nearest(points: Array, r0: Array, r1: Array, links: Array) -> bool:
     return good
 
 
-def _as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """`value` as a float64 array; real numbers only: no text, no bool, nothing complex, None or masked."""
     if type(value) is np.ndarray and value.dtype is _FLOAT:  # the usual case
         return value

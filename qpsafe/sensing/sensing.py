@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.sensing.body import body_hull_set, fixed_to
+from qpsafe.sensing.detection import BadInput, as_floats
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import HullSet, Obstacle
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Seen(NamedTuple):
+class Detected(NamedTuple):
     """What the spots tell in one tick.
 
     Attributes:
@@ -46,6 +47,21 @@ class Seen(NamedTuple):
     severity: str
     too_many: bool
     notes: tuple[str, ...]
+
+
+class Tables(NamedTuple):
+    """What `take_readings` needs of spots, hulls and rules, in its order; does not change."""
+
+    bodies: NDArray[np.int64]
+    links: NDArray[np.int64]
+    rays: Array
+    ranges: Array
+    hull_bodies: NDArray[np.int64]
+    first: NDArray[np.int64]
+    planes: Array
+    balls: Array
+    numbers: Array
+    ticks: NDArray[np.int64]
 
 
 def check_surroundings(
@@ -117,7 +133,7 @@ class DistanceSensing(Fixed):
         cone = np.tan(0.5 * spots.field_of_view)
         ranges = np.ascontiguousarray(np.column_stack((spots.range_max, cone)))
         self.fresh = np.zeros(count)  # ages of readings that come without
-        self.tables = (bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
+        self.tables = Tables(bodies, links, rays, ranges, *hulls.tables, *self._settings(dt))
         for table in self.tables:
             table.flags.writeable = False
         self.memory = (
@@ -145,7 +161,7 @@ class DistanceSensing(Fixed):
         """A person has looked: spots that work again count as working, severity may fall."""
         self.health.acknowledge()
 
-    def update(self, state: RobotState, wire: Wire, distances: Array, ages: Array | None = None) -> Seen:
+    def update(self, state: RobotState, wire: Wire, distances: Array, ages: Array | None = None) -> Detected:
         """Take one tick's readings.
 
         Args:
@@ -162,10 +178,23 @@ class DistanceSensing(Fixed):
         )  # fmt: skip
         severity, too_many, notes = self.take(dead, out)
         moving = velocities[:count] if self.rules.velocities else None
-        return Seen(points[:count], links[:count], moving, severity, too_many, notes)
+        return Detected(points[:count], links[:count], moving, severity, too_many, notes)
+
+    def as_ages(self, ages: ArrayLike | None) -> Array:
+        """Ages of all readings (k,) [s]; zeros for None.
+
+        Raises:
+            BadInput: Neither one number nor one a spot.
+        """
+        if ages is None:
+            return self.fresh
+        ages, shape = as_floats("ages", ages), self.fresh.shape
+        if ages.shape not in ((), shape):
+            raise BadInput(f"ages have shape {ages.shape}, expected {shape} or one number")
+        return np.broadcast_to(ages, shape) if ages.shape == () else ages
 
     def take(self, dead: int, out: int) -> tuple[str, bool, tuple[str, ...]]:
-        """Take how many spots are dead, and how many dead or unusable: severity, too_many and notes as in `Seen`."""
+        """Take how many spots are dead, how many dead or unusable: severity, too_many and notes as in `Detected`."""
         health = self.health
         health.take(dead, out)
         return health.severity, health.too_many, self._notes() if out or health.stopped else ()
