@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.braking import brake
 from qpsafe.checks import (
     check_command,
     check_tasks,
@@ -236,13 +237,13 @@ class SafetyController(Parts):
         samples = recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits, qdd = self._limits, (self._qd - self._qd_before) / self._dt
+        limits = self._limits
         if recovery.phase == RECOVERING and limits is not None:
-            limits = self._gentle.choose(limits, self._q, self._qd, qdd)
+            limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolver = None if barrier is not None else self._quick.resolver(tasks, self._law, limits)
         resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
-            box = None if limits is None else limits.box(self._q, self._qd, qdd)
+            box = None if limits is None else limits.box(self._q, self._qd, self._acceleration)
             level = barrier and barrier.level(seen.measured, self._qd, seen.points, seen.danger)
             soft = (level,) if level else ()
             resolved = resolve(commanded, tasks, samples, qd0, activations, self._law, box, soft, self._dt)
@@ -280,19 +281,16 @@ class SafetyController(Parts):
             off_path=None if recovery.on_path else _errors(tasks, commanded, recovery.path_time),
         )
 
+    @property
+    def _acceleration(self) -> NDArray[np.float64]:
+        """That led to the commanded velocity (n,) [rad/s²]."""
+        return (self._qd - self._qd_before) / self._dt
+
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
-        none = np.zeros(self._robot.nq)
-        box = self._braking.box(self._q, self._qd)
-        most = self._braking.max_acceleration * self._dt
-        slower = self._qd - np.clip(self._qd, -most, most)  # inside the box, whose speeds can all be braked
-        messages = (message,)
-        try:
-            qd0 = np.array(self._evasion.step(none))  # no danger is known: what was known fades
-        except Exception as error:  # an evasion of another making
-            qd0, messages = none, (message, in_words(error))
+        braked = brake(self._braking, self._evasion, self._q, self._qd)
         return Tick(
-            reference=self._reference(slower),
+            reference=self._reference(braked.command),
             cdf_n=float("nan"),
             m=0.0,
             f=0.0,
@@ -300,11 +298,11 @@ class SafetyController(Parts):
             regime="unknown",
             phase=self._recovery.phase,
             status=status,
-            messages=messages,
-            qd0=qd0,
+            messages=(message, *braked.messages),
+            qd0=braked.qd0,
             path_time=self._recovery.path_time,
             joint_names=self._robot.joint_names,
-            resolved=Resolved(slower, 0.0, False, box, None, ()),
+            resolved=Resolved(braked.command, 0.0, False, braked.box, None, ()),
         )
 
     def _reference(self, command: NDArray[np.float64]) -> JointReference:
