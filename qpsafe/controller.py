@@ -140,26 +140,6 @@ class SafetyController(Parts):
         if self._sensing is not None:
             self._sensing.acknowledge()
 
-    def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
-        """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
-
-        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
-
-        Args:
-            tasks: What it is asked to do now, highest priority first.
-            activation: Their thresholds; by default the present ones if the number of tasks stays.
-            restart: Whether the trajectories' clock, and their events, start from zero; else it goes on.
-
-        Raises:
-            ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
-        """
-        check_tasks(self._robot, tasks, self._dt)
-        if activation is None and len(tasks) == len(self._tasks):
-            activation = self._activation
-        activation = checked_activation(tuple(tasks), activation, self._robot)
-        self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
-        self._tasks, self._activation = tuple(tasks), activation
-
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
         self._recovery.paused = True
@@ -222,13 +202,12 @@ class SafetyController(Parts):
             self._q, self._active = np.array(here), True
             self._q.flags.writeable = False
             self._qd = self._qd_before = np.zeros(self._robot.nq)
+        tasks, barrier, recovery = self._tasks, self._barrier, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        tasks, barrier, recovery = self._tasks, self._barrier, self._recovery
-        parts = self._sensing, self._field, self._evasion
-        seen = None if barrier is not None else self._quick.sensed(q, qd, distances, points, ages, *parts)
-        if seen is None:
-            seen = sense(self._robot, q, qd, distances, points, ages, *parts)
+        given = q, qd, distances, points, ages, self._sensing, self._field, self._evasion
+        seen = None if barrier is not None else self._quick.sensed(*given)
+        seen = sense(self._robot, *given) if seen is None else seen
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
@@ -247,13 +226,11 @@ class SafetyController(Parts):
             level = barrier and barrier.level(seen.measured, self._qd, seen.points, seen.danger)
             soft = (level,) if level else ()
             resolved = resolve(commanded, tasks, samples, qd0, activations, self._law, box, soft, self._dt)
-            command = resolved.command
             if barrier is not None:  # exact, as far as the acceleration limits allow
-                command = barrier.scale(seen.measured, command, seen.points).factor * command
-                command = command if box is None else box.clip(command)
-            check_command(command, self._dt)  # whatever limits and barriers of another making do to it
-        else:
-            command = resolved.command
+                command = barrier.scale(seen.measured, resolved.command, seen.points).factor * resolved.command
+                resolved.command = command if box is None else box.clip(command)
+            check_command(resolved.command, self._dt)  # whatever limits and barriers of another making do to it
+        command = resolved.command
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
