@@ -232,10 +232,9 @@ class SafetyController(Parts):
             check_command(resolved.command, self._dt)  # whatever limits and barriers of another making do to it
         command = resolved.command
         usual = resolved.excess <= 1e-9 and resolved.solved
-        messages = () if usual else judged(resolved, self._robot.joint_names)
+        messages = (*(() if usual else judged(resolved, self._robot.joint_names)), *seen.notes)
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
-        messages = (*messages, *seen.notes)
         return Tick(
             reference=self._reference(command),
             cdf_n=cdf_n,
