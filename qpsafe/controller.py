@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.braking import brake
 from qpsafe.checks import (
     check_command,
     check_tasks,
@@ -113,7 +114,7 @@ class SafetyController(Parts):
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._sense = Sense(robot, self._sensing, self._field, self._evasion)
-        self._resolve = Resolve(robot, self._tasks, self._law)
+        self._resolve = Resolve(robot, self._tasks, self._law, self._dt)
         self.reset()
 
     def reset(self) -> None:
@@ -143,26 +144,6 @@ class SafetyController(Parts):
         if self._sensing is not None:
             self._sensing.acknowledge()
         self._units.acknowledge()
-
-    def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
-        """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
-
-        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
-
-        Args:
-            tasks: What it is asked to do now, highest priority first.
-            activation: Their thresholds; by default the present ones if the number of tasks stays.
-            restart: Whether the trajectories' clock, and their events, start from zero; else it goes on.
-
-        Raises:
-            ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
-        """
-        check_tasks(self._robot, tasks, self._dt)
-        if activation is None and len(tasks) == len(self._tasks):
-            activation = self._activation
-        activation = checked_activation(tuple(tasks), activation, self._robot)
-        self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
-        self._tasks, self._activation = tuple(tasks), activation
 
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
@@ -226,9 +207,9 @@ class SafetyController(Parts):
             self._q, self._active = np.array(here), True
             self._q.flags.writeable = False
             self._qd = self._qd_before = np.zeros(self._robot.nq)
+        barrier, recovery = self._barrier, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        barrier, recovery = self._barrier, self._recovery
         seen = self._current_sense()(q, qd, distances, points, ages)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
@@ -238,13 +219,13 @@ class SafetyController(Parts):
         samples = recovery.update(cdf_n, commanded, activations)
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits, qdd = self._limits, (self._qd - self._qd_before) / self._dt
+        limits = self._limits
         if recovery.phase == RECOVERING and limits is not None:
-            limits = self._gentle.choose(limits, self._q, self._qd, qdd)
+            limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         measured = None if barrier is None else self._robot.at(as_joint_position(q, self._robot))
         level = barrier and barrier.level(measured, self._qd, seen.points, seen.danger)
         resolved = self._current_resolve()(
-            commanded, self._qd, qdd, samples, qd0, activations, limits, (level,) if level else (), self._dt
+            commanded, self._qd, self._acceleration, samples, qd0, activations, limits, (level,) if level else ()
         )
         command = resolved.command
         if barrier is not None:  # exact, as far as the acceleration limits allow
@@ -289,22 +270,19 @@ class SafetyController(Parts):
         """The second half of a tick with the present parts."""
         tasks, law = self._resolve.parts
         if not (tasks is self._tasks and law is self._law):
-            self._resolve = Resolve(self._robot, self._tasks, self._law)
+            self._resolve = Resolve(self._robot, self._tasks, self._law, self._dt)
         return self._resolve
+
+    @property
+    def _acceleration(self) -> NDArray[np.float64]:
+        """That led to the commanded velocity (n,) [rad/s²]."""
+        return (self._qd - self._qd_before) / self._dt
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
-        none = np.zeros(self._robot.nq)
-        box = self._braking.box(self._q, self._qd)
-        most = self._braking.max_acceleration * self._dt
-        slower = self._qd - np.clip(self._qd, -most, most)  # inside the box, whose speeds can all be braked
-        messages = (message,)
-        try:
-            qd0 = np.array(self._evasion.step(none))  # no danger is known: what was known fades
-        except Exception as error:  # an evasion of another making
-            qd0, messages = none, (message, in_words(error))
+        braked = brake(self._braking, self._evasion, self._q, self._qd)
         return Tick(
-            reference=self._reference(slower),
+            reference=self._reference(braked.command),
             cdf_n=float("nan"),
             m=0.0,
             f=0.0,
@@ -312,11 +290,11 @@ class SafetyController(Parts):
             regime="unknown",
             phase=self._recovery.phase,
             status=status,
-            messages=messages,
-            qd0=qd0,
+            messages=(message, *braked.messages),
+            qd0=braked.qd0,
             path_time=self._recovery.path_time,
             joint_names=self._robot.joint_names,
-            resolved=Resolved(slower, 0.0, False, box),
+            resolved=Resolved(braked.command, 0.0, False, braked.box),
         )
 
     def _reference(self, command: NDArray[np.float64]) -> JointReference:

@@ -5,9 +5,10 @@ A part never changes, see `qpsafe.fixed`; another one may take its place, and co
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from qpsafe.checks import checked_activation, checked_barrier, checked_evasion, checked_field, checked_law
+from qpsafe.checks import check_tasks, checked_activation, checked_barrier, checked_evasion, checked_field, checked_law
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
@@ -147,3 +148,23 @@ class Parts:
     def recovery(self) -> Recovery:
         """Where it is on that way."""
         return self._recovery
+
+    def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
+        """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
+
+        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
+
+        Args:
+            tasks: What it is asked to do now, highest priority first.
+            activation: Their thresholds; by default the present ones if the number of tasks stays.
+            restart: Whether the trajectories' clock, and their events, start from zero; else it goes on.
+
+        Raises:
+            ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
+        """
+        check_tasks(self._robot, tasks, self._dt)
+        if activation is None and len(tasks) == len(self._tasks):
+            activation = self._activation
+        activation = checked_activation(tuple(tasks), activation, self._robot)
+        self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
+        self._tasks, self._activation = tuple(tasks), activation

@@ -180,9 +180,9 @@ class Recovery:
 
     def _advance(self, state: RobotState) -> None:
         """Let the clock run, at an event only when the tasks are met: no grip beside the part."""
-        step = self.dt / self.rules.ramp
+        step = self._dt / self._rules.ramp
         self._rate = max(self._rate - step, 0.0) if self.paused else min(self._rate + step, 1.0)
-        ahead = self.path_time + self._rate * self.dt
+        ahead = self.path_time + self._rate * self._dt
         for cursor in self._cursors:
             if cursor.due(ahead):
                 self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.checks import checked_velocity
+from qpsafe.checks import check_command, checked_velocity
 from qpsafe.hqp.own_regimes import layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
@@ -96,11 +96,12 @@ class Resolve:
         robot: The robot.
         tasks: Highest priority first.
         law: The law.
+        dt: Tick [s].
     """
 
-    def __init__(self, robot: Robot, tasks: Sequence[Task], law: Law) -> None:
+    def __init__(self, robot: Robot, tasks: Sequence[Task], law: Law, dt: float) -> None:
         self.parts = tasks, law
-        self._robot = robot
+        self._robot, self._dt = robot, dt
         #: Rows of each task that the compiled call fills in, None for the others.
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
         own = type(law) is HierarchicalLaw and law.solver in (None, "own")
@@ -117,7 +118,7 @@ class Resolve:
 
     def __call__(
         self, state: RobotState, qd: Array, qdd: Array, samples: Sequence[Any], qd0: Array,
-        activations: tuple[float, ...], limits: JointLimits | None, soft: tuple[Level, ...] = (), dt: float = 0.004,
+        activations: tuple[float, ...], limits: JointLimits | None, soft: tuple[Level, ...] = (),
     ) -> Resolved:  # fmt: skip
         """Resolve one tick.
 
@@ -130,7 +131,6 @@ class Resolve:
             activations: Of the tasks.
             limits: Joint limits, or None.
             soft: Levels under the limits.
-            dt: Tick [s].
 
         Raises:
             ValueError, TypeError: What a part returned could not be sent to a robot.
@@ -150,16 +150,19 @@ class Resolve:
         ours = self._ours and limits is not None and not soft
         self._weights[:] = weights = weights_of(activations)
         self._qd0[:] = qd0
+        damping = self.parts[1].damping if ours else np.nan
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
-            table, dt, return_speed, self.parts[1].damping if ours else np.nan, *layout, floats, integers, command,
+            table, self._dt, return_speed, damping, *layout, floats, integers, command,
         )  # fmt: skip
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
         frozen = (floats, integers, qd0, weights, counts, perf_counter() - begin, limits is not None)
         if ours:
+            if not plain:  # whatever limits of another making do to it
+                check_command(command, self._dt)
             return Resolved(command, excess, worst == 0.0, frozen=frozen)
-        return self._by_law(Resolved(command, 0.0, False, frozen=frozen), state, activations, soft, dt)
+        return self._by_law(Resolved(command, 0.0, False, frozen=frozen), state, activations, soft)
 
     def _take(self, state: RobotState, samples: Sequence[Any]) -> tuple[tuple[int, ...], dict[int, Clik]]:
         """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
@@ -204,7 +207,7 @@ class Resolve:
             cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
 
     def _by_law(
-        self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...], dt: float
+        self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]
     ) -> Resolved:
         """Ask a law of another making, or for what the compiled call does not know."""
         cut, (_, _, qd0, _, counts, _, limited) = made._parts, made._frozen  # type: ignore[misc]
@@ -212,8 +215,9 @@ class Resolve:
         wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
         lower, upper = cut.bounds.copy() if limited else (None, None)
         result = self.parts[1].solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
-        answer = checked_velocity(result, state.q, dt)
+        answer = checked_velocity(result, state.q, self._dt)
         command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
+        check_command(command, self._dt)
         return Resolved(command, excess, result.status == SOLVED, result=result, frozen=made._frozen)
 
 

@@ -107,9 +107,9 @@ class Evasion:
         self._mass = _positive_definite(mass, n, "mass")
         self._damping = _positive_definite(damping, n, "damping")
         # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
-        self._A = expm(-np.linalg.solve(self._mass, self._damping) * dt).copy()
-        self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T.copy()
-        for array in (self._mass, self._damping, self._A, self._B):
+        self._A = expm(-np.linalg.solve(self._mass, self._damping) * dt)
+        self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
+        for array in (self._mass, self._damping):
             array.flags.writeable = False
         self.velocity = np.zeros(n)
 
@@ -137,7 +137,7 @@ class Evasion:
 
     @property
     def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A, B (n, n) of a step, q̇0 <- A q̇0 + B σ; read-only."""
+        """A, B (n, n) of a step, q̇0 <- A q̇0 + B σ."""
         return self._A, self._B
 
     def reset(self) -> None:

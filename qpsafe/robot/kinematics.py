@@ -58,7 +58,7 @@ def tree_of(model: Any, ends: tuple[int, ...]) -> Tree:
         supports[i + 1] = supports[parent]
         supports[i + 1, i] = 1.0
     frames = [model.frames[index] for index in ends]
-    tree = Tree(
+    return Tree(
         parents,
         np.array([placement.homogeneous for placement in list(model.jointPlacements)[1:]]),
         np.array([np.asarray(joint.S).reshape(6) for joint in list(data.joints)[1:]]),
@@ -66,9 +66,6 @@ def tree_of(model: Any, ends: tuple[int, ...]) -> Tree:
         np.array([frame.parentJoint for frame in frames], dtype=np.int64),
         np.array([frame.placement.translation for frame in frames]).reshape(-1, 3),
     )
-    for array in tree:
-        array.flags.writeable = False
-    return tree
 
 
 @inline

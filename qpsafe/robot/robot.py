@@ -103,8 +103,6 @@ class Robot(Fixed):
         starts = np.array([place[start] for start, _ in spec.wire_frames], dtype=np.intp)
         stops = np.array([place[stop] for _, stop in spec.wire_frames], dtype=np.intp)
         self.wire_indices = (starts, stops)
-        for array in self.wire_indices:
-            array.flags.writeable = False
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
         self.memory = self.tree.memory

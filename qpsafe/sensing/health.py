@@ -46,7 +46,7 @@ class SpotHealth:
         #: Columns: code of this tick, ticks without a usable reading up to now, ticks with the same reading.
         self.counts: NDArray[np.int64] = np.zeros((count, 3), dtype=np.int64)
         self.dead: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
-        #: Columns: the last reading, NaN for none, the point it meant at first, the last reading's age, NaN for none.
+        #: Columns: the last reading, NaN for none; the point it meant at first; the largest possible age, NaN for any.
         self.seen = np.empty((count, 5))
         self.reset()
 
@@ -109,9 +109,9 @@ def judge(
     origin: Vector,
     direction: Vector,
     range_max: float,
-    dt: float,
     max_age: float,
-    clock_error: float,
+    least: float,
+    growth: float,
     motion: float,
     stuck_ticks: int,
     dead_ticks: int,
@@ -119,18 +119,21 @@ def judge(
     seen: Array,
     dead: Array,
 ) -> int:
-    """Code of spot i's reading d; counts sick ticks, lets the dead die. Arrays as in `SpotHealth`."""  # fmt: skip
+    """Code of spot i's reading d; counts sick ticks, lets the dead die. Arrays as in `SpotHealth`.
+
+    An age is possible from `least` on, and up to `growth` more than in the last tick [s].
+    """  # fmt: skip
     if d != d:
         code = NOT_A_NUMBER
     elif not d >= 0.0:  # -inf too
         code = BELOW_ZERO
     elif not age <= max_age:  # an age that is not a number is stale
         code = STALE
-    elif age < -clock_error or age > seen[i, 4] + dt + clock_error:  # false where there was none
+    elif age < least or age > seen[i, 4]:  # false where there was none
         code = IMPOSSIBLE_AGE
     else:
         code = HEALTHY
-    seen[i, 4] = age
+    seen[i, 4] = age + growth
     # stuck: the same bits tick after tick, while the point they mean is carried along by the robot
     if 0.0 <= d <= range_max:
         last, moved = seen[i, 0], 0.0

@@ -78,7 +78,7 @@ def take_readings(
     """  # fmt: skip
     dt, d_min, tolerance, max_age, motion = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
     step, jump, alpha, beta, fastest = numbers[5], numbers[6], numbers[7], numbers[8], numbers[9]
-    clock_error = numbers[10]
+    least, growth = -numbers[10], dt + numbers[10]
     stuck_ticks, dead_ticks, hold_ticks, moving = ticks[0], ticks[1], ticks[2], ticks[3]
     n = (memory.shape[0] - 16) // 16  # enough for the poses of the bodies, which come first
     poses = view(memory, 0, (n + 1, 4, 4))
@@ -87,7 +87,7 @@ def take_readings(
         d = distances[i]
         origin, direction = ray_of(poses[bodies[i]], rays[i])
         code = judge(
-            i, d, ages[i], origin, direction, ranges[i, 0], dt, max_age, clock_error, motion, stuck_ticks, dead_ticks,
+            i, d, ages[i], origin, direction, ranges[i, 0], max_age, least, growth, motion, stuck_ticks, dead_ticks,
             counts, seen, dead,
         )  # fmt: skip
         usable = code == HEALTHY

@@ -105,6 +105,8 @@ class DistanceSensing(Fixed):
         RobotFileError: The robot's collision geometry cannot be read.
     """
 
+    fixed = frozenset(("rules", "spots", "health", "tables", "memory"))
+
     def __init__(
         self,
         robot: Robot,
@@ -129,7 +131,7 @@ class DistanceSensing(Fixed):
         self._hold = PointHold(count, rules, dt)
         self._velocity = ApproachVelocity(count, dt)
         bodies, rays = spots.mounting(robot)
-        links = np.asarray(spots.links, dtype=np.int64)
+        links = np.array(spots.links, dtype=np.int64)
         cone = np.tan(0.5 * spots.field_of_view)
         ranges = np.ascontiguousarray(np.column_stack((spots.range_max, cone)))
         self.fresh = np.zeros(count)  # ages of readings that come without
