@@ -1,139 +1,108 @@
-"""Timing of the loop's parts: percentiles of many single calls, compilation excluded."""
+"""Timing: rows take turns, block by block, so that what disturbs the machine disturbs all of them."""
 
 from __future__ import annotations
 
 import gc
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from qpsafe.controller import SafetyController
-from qpsafe.danger.field import DangerField
-from qpsafe.laws.problem import Law
-from qpsafe.robot.loader import load_robot
-from qpsafe.sensing.hulls import Obstacle
-from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.sensing.spots import load_spots
-from qpsafe.tasks.orientation import OrientationTask
-from qpsafe.tasks.position import PositionTask
-from qpsafe.tasks.trajectory import FixedPose
+#: Calls in a block; short against what disturbs a machine, long enough to fill the caches again.
+BLOCK = 50
 
-_STRIDE = 250  # calls between two words to a progress bar, which would push what is timed out of the caches
+
+class Row(NamedTuple):
+    """Something to time.
+
+    Attributes:
+        call: `call(k)` is the k-th call.
+        collector: The garbage collector while timing: "off", as a 250 Hz loop would have it; "on"; or "frozen", on, but
+            after `gc.freeze` it does not look at what was there before.
+    """
+
+    call: Callable[[int], Any]
+    collector: str = "off"
 
 
 class Times(NamedTuple):
-    """Percentiles of wall times [s]."""
+    """Wall times [s], and what they are of the row that all are compared with.
+
+    Attributes:
+        runs: Number of calls.
+        median, p99, p999, maximum: Percentiles of single calls.
+        ratio: Median of the ratios of the blocks' medians, block by block; NaN where nothing is compared with.
+        ratio_low, ratio_high: Their quartiles.
+    """
 
     runs: int
     median: float
     p99: float
     p999: float
     maximum: float
+    ratio: float = float("nan")
+    ratio_low: float = float("nan")
+    ratio_high: float = float("nan")
 
 
-def time_calls(
-    call: Callable[[int], Any],
+def time_rows(
+    rows: Mapping[str, Row],
     runs: int,
+    peer: str | None = None,
     warm_up: int = 200,
     progress: Callable[[int], None] | None = None,
-    collector: str = "off",
-) -> Times:
-    """Time `call(k)` for k = 0 .. runs-1 one by one, after `warm_up` calls that do not count.
+) -> dict[str, Times]:
+    """Time the calls of all rows one by one, a block of each in turn, after `warm_up` calls that do not count.
 
     Args:
-        call: What is timed.
-        runs: How often.
+        rows: What is timed, by name.
+        runs: Calls of each row, rounded up to whole blocks.
+        peer: The row that the others are compared with.
         warm_up: Calls before.
-        progress: Told now and then how many calls have been made since it was told last.
-        collector: The garbage collector while timing: "off", as a 250 Hz loop would have it; "on"; or "frozen", on, but
-            after `gc.freeze` it does not look at what was there before.
+        progress: Told after every round how many calls have been made since it was told last.
     """
-    for k in range(warm_up):
-        call(k)
-    taken = np.empty(runs)
+    blocks = -(-runs // BLOCK)
+    taken = {name: np.empty((blocks, BLOCK)) for name in rows}
+    for row in rows.values():
+        for k in range(-warm_up, 0):
+            row.call(k)
     gc.collect()
-    if collector == "off":
-        gc.disable()
-    elif collector == "frozen":
-        gc.freeze()
     try:
-        for k in range(runs):
-            start = time.perf_counter()
-            call(k)
-            taken[k] = time.perf_counter() - start
-            if progress is not None and k % _STRIDE == _STRIDE - 1:
-                progress(_STRIDE)
+        for block in range(blocks):
+            for name, row in rows.items():
+                _collect(row.collector)
+                times = taken[name][block]
+                for i in range(BLOCK):
+                    start = time.perf_counter()
+                    row.call(block * BLOCK + i)
+                    times[i] = time.perf_counter() - start
+                gc.unfreeze()
+            if progress is not None:
+                progress(BLOCK * len(rows))
     finally:
         gc.enable()
         gc.unfreeze()
-    return Times(runs, *(float(value) for value in np.percentile(taken, (50.0, 99.0, 99.9, 100.0))))
+    return {name: _summary(times, None if peer is None else taken[peer]) for name, times in taken.items()}
 
 
-def time_danger_field(runs: int, progress: Callable[[int], None] | None = None) -> Times:
-    """Value and gradient at 20 points around the moving IRB 140 (6 links)."""
-    robot, rng, field = load_robot("irb140"), np.random.default_rng(0), DangerField()
-    wire = robot.wire(robot.home, rng.normal(size=6))
-    points = rng.uniform(-1.0, 1.0, (20, 3)) + np.array([0.3, 0.0, 0.6])
-    return time_calls(lambda _: field.evaluate(points, wire), runs, progress=progress)
+def _collect(how: str) -> None:
+    if how == "off":
+        gc.disable()
+        return
+    gc.enable()
+    if how == "frozen":
+        gc.freeze()
 
 
-def time_sensing(runs: int, progress: Callable[[int], None] | None = None) -> Times:
-    """From 20 readings to the points that count: the IRB 140 with a known floor and table, all filters on.
-
-    The readings sweep slowly, with noise; two spots are sick now and then. The kinematics of the tick are not included.
-    """
-    robot, rng = load_robot("irb140"), np.random.default_rng(0)
-    spots = load_spots(robot)
-    assert spots is not None
-    known = (Obstacle.box("floor", (6, 6, 0.5), (0, 0, -0.8)), Obstacle.box("table", (0.6, 1.0, 0.05), (0.8, 0, 0.3)))
-    sensing = DistanceSensing(robot, spots, 0.004, SensingRules(velocities=True), known)
-    state, wire = robot.at(robot.home), robot.wire(robot.home, np.zeros(6))
-    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(500) / 500.0)
-    readings = sweep[:, None] + rng.normal(0.0, 0.003, (500, len(spots)))
-    readings[::50, :2] = np.nan
-    return time_calls(lambda k: sensing.update(state, wire, readings[k % 500]), runs, progress=progress)
-
-
-def time_ticks(
-    law: Law,
-    runs: int,
-    progress: Callable[[int], None] | None = None,
-    *,
-    points: bool = False,
-    collector: str = "off",
-) -> Times:
-    """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through medium and high danger and back.
-
-    The distances sweep slowly from 0.76 m to 0.32 m and back; the path is suspended and the robot recovers. It follows
-    its references exactly.
-
-    Args:
-        law: The law.
-        runs: Number of ticks.
-        progress: Called now and then.
-        points: Give the detected points themselves: everything but what is done to raw sensor readings.
-        collector: As for `time_calls`.
-    """
-    robot = load_robot("irb140")
-    target = FixedPose(robot.pose("tcp", robot.home))
-    controller = SafetyController(robot, [PositionTask("tcp", target), OrientationTask("tcp", target)], law)
-    assert controller.spots is not None
-    offsets = np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))
-    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
-    distances, home = [d + offsets for d in sweep], robot.at(robot.home)
-    given = [controller.spots.points(home, d) for d in distances] if points else distances
-    state = [np.array(robot.home), np.zeros(6)]
-
-    def tick(k: int) -> None:
-        reference = controller.step(state[0], state[1], given[k % 2500]).reference
-        state[:] = reference.q, reference.qd
-
-    return time_calls(tick, runs, progress=progress, collector=collector)
+def _summary(times: np.ndarray, peer: np.ndarray | None) -> Times:
+    figures = [float(value) for value in np.percentile(times, (50.0, 99.0, 99.9, 100.0))]
+    if peer is None:
+        return Times(times.size, *figures)
+    ratios = np.median(times, axis=1) / np.median(peer, axis=1)
+    return Times(times.size, *figures, *(float(value) for value in np.percentile(ratios, (50.0, 25.0, 75.0))))
 
 
 def machine() -> dict[str, str]:

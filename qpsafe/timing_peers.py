@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from qpsafe.robot.loader import load_robot
-from qpsafe.timing import Times, time_calls
+from qpsafe.timing import Row
+
+MINK = "mink.solve_ik + daqp: frame, posture, limits"
+PINK = "pink.solve_ik + daqp: frame, posture, limits"
 
 
-def time_mink(runs: int, progress: Callable[[int], None] | None = None) -> Times:
+def mink_row() -> Row:
     """`mink.solve_ik` with daqp on the IRB 140, at a moving target; the configuration is updated in each call."""
     import mink
     import mujoco
@@ -31,10 +33,10 @@ def time_mink(runs: int, progress: Callable[[int], None] | None = None) -> Times
         qd = mink.solve_ik(configuration, [frame, posture], 0.004, "daqp", limits=limits)
         configuration.integrate_inplace(qd, 0.004)
 
-    return time_calls(tick, runs, progress=progress)
+    return Row(tick)
 
 
-def time_pink(runs: int, progress: Callable[[int], None] | None = None) -> Times | None:
+def pink_row() -> Row | None:
     """`pink.solve_ik` with daqp on the same job; None where the extra "bench" is not installed."""
     try:
         import pink
@@ -57,7 +59,7 @@ def time_pink(runs: int, progress: Callable[[int], None] | None = None) -> Times
         qd = pink.solve_ik(configuration, [frame, posture], 0.004, solver="daqp")
         configuration.integrate_inplace(qd, 0.004)
 
-    return time_calls(tick, runs, progress=progress)
+    return Row(tick)
 
 
 def _targets(robot: Any) -> list[Any]:

@@ -15,7 +15,6 @@ from qpsafe.cli.outputs import output_file
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.laws.problem import Law
     from qpsafe.timing import Times
     from qpsafe.timing_compile import Start
 
@@ -36,40 +35,33 @@ def bench(
         _compilation(screen, out, json)
         return
     screen.print("Warming up (the first time, compiling the kernels takes about 15 s) ...", style="dim")
-    from qpsafe.timing import machine, time_danger_field, time_sensing, time_ticks
-    from qpsafe.timing_peers import time_mink, time_pink
+    from qpsafe.timing import machine, time_rows
+    from qpsafe.timing_own import rows
+    from qpsafe.timing_peers import MINK, PINK, mink_row, pink_row
 
+    timed = {**rows(), MINK: mink_row()}
+    pink = pink_row()
+    if pink is not None:
+        timed[PINK] = pink
     with progress_bar(screen) as progress:
-        task = progress.add_task("danger field", total=2000)
-        field = time_danger_field(2000, partial(progress.advance, task))
-        rows = {"danger field, 20 points x 6 links": field}
-        task = progress.add_task("sensing", total=5000)
-        sensing = time_sensing(5000, partial(progress.advance, task))
-        rows["sensing, 20 spots, all filters"] = sensing
-        for name, (law, options) in _ticks().items():
-            task = progress.add_task(name, total=ticks)
-            rows[name] = time_ticks(law, ticks, partial(progress.advance, task), **options)
-        task = progress.add_task("mink and pink", total=2 * 5000)
-        rows[MINK] = time_mink(5000, partial(progress.advance, task))
-        pink = time_pink(5000, partial(progress.advance, task))
-        if pink is not None:
-            rows["pink.solve_ik + daqp: frame, posture, limits"] = pink
+        task = progress.add_task("timing, block by block", total=len(timed) * ticks)
+        times = time_rows(timed, ticks, peer=MINK, progress=partial(progress.advance, task))
     if not json:
-        show(rows, machine(), screen)
-    _write(screen, out, json, {name: t._asdict() for name, t in rows.items()})
+        show(times, machine(), screen)
+    _write(screen, out, json, {name: t._asdict() for name, t in times.items()})
 
 
-def show(rows: dict[str, Times], machine: dict[str, str], screen: Console) -> None:
-    """Print the percentiles."""
+def show(times: dict[str, Times], machine: dict[str, str], screen: Console) -> None:
+    """Print the percentiles and ratios."""
     from qpsafe.cli.sheet import Sheet
 
-    title = f"Wall time [µs], one thread: {machine['processor']}, Python {machine['python']}"
-    sheet = Sheet(title, ("what", "runs", "median", "p99", "p99.9", "max"))
-    for name, t in rows.items():
-        sheet.add_row(name, str(t.runs), *(f"{1e6 * value:.1f}" for value in (t.median, t.p99, t.p999, t.maximum)))
+    title = f"Wall time [µs], one thread, blocks in turn: {machine['processor']}, Python {machine['python']}"
+    sheet = Sheet(title, ("what", "runs", "median", "p99", "p99.9", "max", "of mink", "quartiles"))
+    for name, t in times.items():
+        figures = (f"{1e6 * value:.1f}" for value in (t.median, t.p99, t.p999, t.maximum))
+        spread = f"{t.ratio_low:.2f} to {t.ratio_high:.2f}"
+        sheet.add_row(name, str(t.runs), *figures, f"{t.ratio:.2f}", spread)
     screen.print(sheet)
-    ratio = rows[MAIN].median / rows[MINK].median
-    screen.print(f"The whole tick takes {ratio:.2f} of mink.solve_ik with daqp (medians of this run).")
 
 
 def _compilation(screen: Console, out: Path | None, json: bool) -> None:
@@ -106,25 +98,3 @@ def _write(screen: Console, out: Path | None, json: bool, results: dict[str, Any
         screen.print(f"written to {out}")
     if json:
         print_json(content)
-
-
-#: What a robot with its own sensors runs; everything else is beside it.
-MAIN = "whole tick, 20 distances"
-MINK = "mink.solve_ik + daqp: frame, posture, limits"
-
-
-def _ticks() -> dict[str, tuple[Law, dict[str, Any]]]:
-    """Ticks to time: law and options of `time_ticks`. The hierarchical law is strict where nothing else is said."""
-    from qpsafe.laws.hierarchical import HierarchicalLaw
-    from qpsafe.laws.nullspace import NullspaceLaw
-    from qpsafe.laws.weighted import WeightedLaw
-
-    return {
-        MAIN: (HierarchicalLaw(), {}),
-        f"{MAIN}, garbage collector on": (HierarchicalLaw(), {"collector": "on"}),
-        f"{MAIN}, collector on after gc.freeze": (HierarchicalLaw(), {"collector": "frozen"}),
-        "whole tick, 20 points given": (HierarchicalLaw(), {"points": True}),
-        f"{MAIN}, paper's projection": (HierarchicalLaw("paper"), {}),
-        f"{MAIN}, weighted law": (WeightedLaw(), {}),
-        f"{MAIN}, null-space law": (NullspaceLaw(), {}),
-    }

@@ -15,6 +15,7 @@ from qpsafe import __version__
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
 from qpsafe.sim.run_file import read_run
+from qpsafe.timing import BLOCK, Row, time_rows
 
 run = CliRunner().invoke
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
@@ -147,13 +148,26 @@ def test_bench_compiles_every_kernel_and_finds_it_in_the_cache(tmp_path: Path) -
     assert later["processor"] < 0.5 * first["processor"]
 
 
+def test_rows_take_turns_and_are_compared_block_by_block() -> None:
+    calls: list[str] = []
+    rows = {name: Row(lambda _, name=name: calls.append(name)) for name in ("a", "b")}
+    times = time_rows(rows, 2 * BLOCK, peer="a", warm_up=0)
+    assert calls == (["a"] * BLOCK + ["b"] * BLOCK) * 2
+    assert times["a"].runs == 2 * BLOCK
+    assert times["a"].ratio == times["a"].ratio_low == 1.0
+
+
 def test_bench_writes_its_figures(tmp_path: Path) -> None:
+    from qpsafe.timing_peers import MINK
+
     result = run(app, ["bench", "--ticks", "100", "--json", "--out", str(tmp_path / "bench.json")])
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout) == json.loads((tmp_path / "bench.json").read_text())
     content = json.loads((tmp_path / "bench.json").read_text())
     for times in content["results"].values():
         assert 0.0 < times["median"] <= times["p99"] <= times["p999"] <= times["maximum"]
+        assert 0.0 < times["ratio_low"] <= times["ratio"] <= times["ratio_high"]
+    assert content["results"][MINK]["ratio"] == 1.0
     assert content["machine"]["processor"]
 
 
