@@ -62,7 +62,7 @@ def test_an_explanation_says_what_gave_way(run: Any) -> None:
         tick = loop.step(near(loop, 0.3))
     text = str(tick)
     assert f"CDF_n = {tick.cdf_n:.3f}" in text
-    assert "1 points" in text
+    assert "  1 point, " in text
     assert "task 1: activation" in text
     assert "task 2: activation" in text
     assert len(re.findall("QP of weight", text)) == len(tick.residuals) >= 1
