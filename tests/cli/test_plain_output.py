@@ -7,13 +7,16 @@ import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
 import typer.main
 
-from qpsafe.cli import common, main
+from qpsafe.cli import common, demo, main
 from qpsafe.cli.sheet import Sheet
+from qpsafe.robot.loader import load_robot
+from qpsafe.sim.fixed import FixedExperiment
 
 HOSTILE = "arm[/x] [red]b[/] :smile: [0m]"
 WIDTHS = (60, 80)
@@ -61,6 +64,20 @@ def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch, capsy
         text = capsys.readouterr().out
         assert "…" not in text
         assert set(HOSTILE.split()) | {"0/1234567"} <= set(text.split())
+
+
+def test_an_extra_to_install_is_named_in_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio.v2", None)
+    monkeypatch.setattr("qpsafe.sim.gl.gl_available", lambda: (True, ""))
+    experiment, screen = FixedExperiment(load_robot("irb140"), duration=0.1), common.console(False)
+    with (
+        common.progress_bar(screen) as progress,
+        demo.observed(experiment, tmp_path / "a.mp4", True, False, screen, progress, "a run") as (_, filmed),
+    ):
+        assert not filmed
+    assert "pip install 'qpsafe[video]'" in " ".join(capsys.readouterr().out.split())
 
 
 def test_json_is_a_flag_of_every_command() -> None:

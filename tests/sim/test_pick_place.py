@@ -126,7 +126,7 @@ def test_the_report_names_what_is_not_kept(alone: PickRun) -> None:
     assert all(check.kept for check in promises([with_people], good, 1))
     assert cost(with_people, good) == pytest.approx(2.0)
     worse = {
-        "cycles done": replace(with_people, finished=False),
+        "cycle done": replace(with_people, finished=False),
         "delivered": replace(with_people, delivered=0),
         "missed or lost": replace(with_people, lost=1),
         "contact": replace(with_people, contacts=1, nearest_moving=-0.01),
