@@ -19,7 +19,7 @@ from qpsafe.sensing.spots import SpotArray
 #: Readings [m], and points from the world's origin [m], that nothing of their kind tells.
 FARTHEST_READING, FARTHEST_POINT = 10.0, 100.0
 #: For this long [s], looked at this many times.
-LASTING, LOOKS = 1.0, 10
+LASTING, LOOKS = 1.0, 5
 
 
 class UnitWatch:
@@ -42,7 +42,7 @@ class UnitWatch:
         self._tick, self._notes = 0, ()
         self._counts = np.zeros(len(self._names), dtype=np.int64)
         self._odd = np.zeros(len(self._names), dtype=np.bool_)
-        self._points = 0
+        self._suspected, self._points = False, 0
 
     #: A person has looked: what goes on will be noticed again.
     acknowledge = reset
@@ -60,9 +60,12 @@ class UnitWatch:
         return self._notes
 
     def _look_at_readings(self, distances: np.ndarray) -> None:
-        far = np.isfinite(distances) & (distances > self._farthest)
+        far = (distances > self._farthest) & (distances < np.inf)
+        if not (self._suspected or far.any()):  # the usual case
+            return
         self._counts[far] += 1
         self._counts[(distances >= 0.0) & (distances <= self._farthest)] = 0
+        self._suspected = bool(self._counts.any())
         odd = self._odd | (self._counts >= LOOKS)
         if (odd != self._odd).any():
             self._odd = odd

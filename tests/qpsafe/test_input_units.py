@@ -11,7 +11,7 @@ import qpsafe
 from qpsafe.sensing.units import FARTHEST_POINT, FARTHEST_READING, UnitWatch
 
 DT = 0.004
-SECOND = 251  # ticks in which ten looks fall for certain
+SECOND = 251  # ticks in which five looks fall for certain
 metres = st.floats(0.15, 8.0) | st.just(np.inf)
 
 
@@ -60,7 +60,7 @@ def test_points_in_millimetres_are_noticed_and_in_metres_are_not(points: list, d
 def test_one_reading_in_metres_begins_the_time_anew(spots: Any) -> None:
     watch = UnitWatch(spots, DT)
     for k in range(10 * SECOND):
-        near = k % 200 < 25  # a look falls into these
+        near = k % 200 < 60  # a look falls into these
         assert watch.notes(np.full(20, FARTHEST_READING if near else 42.0), None) == ()
 
 
