@@ -195,6 +195,8 @@ class SafetyController:
             tick = self._brake(FAULT, f"{type(error).__name__}: {error}")
         if self.sensing is not None:
             tick.severity, tick.unseen = self.sensing.health.severity, self.sensing.unseen
+            if self._units.odd:
+                tick.unseen = tuple(dict.fromkeys((*tick.unseen, *self._units.odd)))
         tick.solve_time = time.perf_counter() - start
         return tick
 

@@ -94,5 +94,8 @@ def test_the_tick_says_so_until_acknowledged(irb140: Any, kind: str) -> None:
         texts = {tick.messages for tick in ticks}
         assert len(texts) == 2  # nothing, then one and the same
         assert "centimetres or millimetres" in ticks[-1].messages[0]
+        names = controller.spots.names if "distances" in given_ and np.ndim(given_["distances"]) == 1 else ()
+        seen = np.isfinite(np.asarray(given_.get("distances", ()), dtype=float)) if names else ()
+        assert ticks[-1].unseen == tuple(name for name, odd in zip(names, seen, strict=True) if odd)
         controller.acknowledge()
     assert FARTHEST_POINT > 50.0
