@@ -189,6 +189,8 @@ class SafetyController(Parts):
                 raise
         if self._sensing is not None:
             tick.severity, tick.unseen = self._sensing.health.severity, self._sensing.unseen
+            if self._units.odd:
+                tick.unseen = tuple(dict.fromkeys((*tick.unseen, *self._units.odd)))
         self._advance(tick.reference)
         tick.solve_time = time.perf_counter() - start
         return tick

@@ -50,7 +50,8 @@ class Tick:
         events: Names of the events that the tasks' programs reached at this tick, e.g. ``grip``.
         waits_for: Names of the tasks that the path waits for: in ``recovering``, or with an event due.
         severity: Of sick sensors, until acknowledged: ``clear``, ``capped`` (speed) or ``stopped``.
-        unseen: Names of the spots that cannot be trusted now: nobody knows what is in front of them.
+        unseen: Names of the spots that cannot be trusted now, sick or in another unit than metres: nobody knows what is
+            in front of them.
         joint_names: (n,) names used in reports.
         resolved: What tasks, limits and law came to; None if they were not asked.
         off_path: The `errors` where the references of this tick were not the tasks' own trajectories.

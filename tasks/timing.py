@@ -21,6 +21,9 @@ from qpsafe.tasks.trajectory import checked_vector
 
 Array = NDArray[np.float64]
 
+#: Ruckig tells nothing apart that is nearer than 1e-8: with smaller rates it may answer a jump.
+SLOWEST = 1e-8
+
 
 class Motion(NamedTuple):
     """Position, velocity and acceleration of every coordinate, (n,) each."""
@@ -72,7 +75,7 @@ class TimeLaw(Fixed):
             motion brakes first.
 
     Raises:
-        ConfigurationError: Something is not finite, a rate is not positive, or the numbers are so large, so small or
+        ConfigurationError: Something is not finite, a rate is below `SLOWEST`, or the numbers are so large, so small or
             so far apart that no switching times can be computed.
     """
 
@@ -102,8 +105,8 @@ class TimeLaw(Fixed):
         }
         checked = {key: checked_vector("TimeLaw", key, value, n) for key, value in given.items()}
         for key in ("speed", "acceleration", "jerk"):
-            if not (checked[key] > 0.0).all():
-                raise ConfigurationError("TimeLaw", key, given[key], "numbers > 0")
+            if not (checked[key] >= SLOWEST).all():
+                raise ConfigurationError("TimeLaw", key, given[key], f"numbers >= {SLOWEST:g}")
         problem = ruckig.InputParameter(n)
         problem.current_position, problem.target_position = first.tolist(), checked["goal"].tolist()
         problem.current_velocity = checked["velocity"].tolist()

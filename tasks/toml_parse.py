@@ -14,7 +14,7 @@ from typing import Any
 #: A file larger than this is none that a person wrote [bytes].
 LARGEST = 1_000_000
 #: Tables and lists in each other, and parts of a dotted key.
-DEEPEST = 20
+DEEPEST = 10
 #: TOML promises whole numbers of 64 bits.
 _WHOLE = range(-(2**63), 2**63)
 _PART = r"""(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""

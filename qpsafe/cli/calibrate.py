@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,10 +76,10 @@ def _target(robot: str | None, out: Path | None) -> Path:
         return out
     if robot is None:
         raise ConfigurationError("calibrate", "--robot", None, "a robot folder to write into, or a file by --out")
-    if robot in bundled_robots() and not Path(robot).is_dir():
+    if robot in bundled_robots() and not os.path.isdir(robot):
         expected = "a path of your own copy of the robot's folder, or a file by --out: bundled robots are not changed"
         raise ConfigurationError("calibrate", "--robot", robot, expected)
-    if not (Path(robot) / "robot.toml").is_file():
+    if not os.path.isfile(Path(robot) / "robot.toml"):
         raise ConfigurationError("calibrate", "--robot", robot, "a folder with a robot.toml")
     try_file("qpsafe calibrate", "--robot", Path(robot) / FILE_NAME)
     return Path(robot) / FILE_NAME

@@ -18,8 +18,8 @@ from qpsafe.tasks.toml_parse import read_bounded, toml_table
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
-_Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]
+_Positive = Annotated[float, Field(strict=True, gt=0.0, le=1e3, allow_inf_nan=False)]
 _Angle = Annotated[float, Field(strict=True, ge=0.0, le=90.0, allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]
 

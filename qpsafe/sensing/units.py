@@ -19,7 +19,7 @@ from qpsafe.sensing.spots import SpotArray
 #: Readings [m], and points from the world's origin [m], that nothing of their kind tells.
 FARTHEST_READING, FARTHEST_POINT = 10.0, 100.0
 #: For this long [s], looked at this many times.
-LASTING, LOOKS = 1.0, 10
+LASTING, LOOKS = 1.0, 5
 
 
 class UnitWatch:
@@ -28,6 +28,9 @@ class UnitWatch:
     Args:
         spots: The distance sensors, or None.
         dt: Tick [s].
+
+    Attributes:
+        odd: Names of the spots that it has noticed: nobody knows what is in front of them.
     """
 
     def __init__(self, spots: SpotArray | None, dt: float) -> None:
@@ -39,10 +42,12 @@ class UnitWatch:
 
     def reset(self) -> None:
         """Forget everything."""
-        self._tick, self._notes = 0, ()
+        self._tick = 0
+        self.odd: tuple[str, ...] = ()
+        self._notes: tuple[str, ...] = ()
         self._counts = np.zeros(len(self._names), dtype=np.int64)
-        self._odd = np.zeros(len(self._names), dtype=np.bool_)
-        self._points = 0
+        self._noticed = np.zeros(len(self._names), dtype=np.bool_)
+        self._suspected, self._points = False, 0
 
     #: A person has looked: what goes on will be noticed again.
     acknowledge = reset
@@ -60,13 +65,17 @@ class UnitWatch:
         return self._notes
 
     def _look_at_readings(self, distances: np.ndarray) -> None:
-        far = np.isfinite(distances) & (distances > self._farthest)
+        far = (distances > self._farthest) & (distances < np.inf)
+        if not (self._suspected or far.any()):  # the usual case
+            return
         self._counts[far] += 1
         self._counts[(distances >= 0.0) & (distances <= self._farthest)] = 0
-        odd = self._odd | (self._counts >= LOOKS)
-        if (odd != self._odd).any():
-            self._odd = odd
-            who = ", ".join(name for name, is_odd in zip(self._names, odd, strict=True) if is_odd)
+        self._suspected = bool(self._counts.any())
+        noticed = self._noticed | (self._counts >= LOOKS)
+        if (noticed != self._noticed).any():
+            self._noticed = noticed
+            self.odd = tuple(self._names[i] for i in noticed.nonzero()[0])
+            who = ", ".join(self.odd)
             self._say(f"only readings beyond {FARTHEST_READING:g} m, which no such sensor tells: {who}")
 
     def _look_at_points(self, points: np.ndarray) -> None:

@@ -11,7 +11,7 @@ import qpsafe
 from qpsafe.sensing.units import FARTHEST_POINT, FARTHEST_READING, UnitWatch
 
 DT = 0.004
-SECOND = 251  # ticks in which ten looks fall for certain
+SECOND = 251  # ticks in which five looks fall for certain
 metres = st.floats(0.15, 8.0) | st.just(np.inf)
 
 
@@ -60,7 +60,7 @@ def test_points_in_millimetres_are_noticed_and_in_metres_are_not(points: list, d
 def test_one_reading_in_metres_begins_the_time_anew(spots: Any) -> None:
     watch = UnitWatch(spots, DT)
     for k in range(10 * SECOND):
-        near = k % 200 < 25  # a look falls into these
+        near = k % 200 < 60  # a look falls into these
         assert watch.notes(np.full(20, FARTHEST_READING if near else 42.0), None) == ()
 
 
@@ -94,5 +94,8 @@ def test_the_tick_says_so_until_acknowledged(irb140: Any, kind: str) -> None:
         texts = {tick.messages for tick in ticks}
         assert len(texts) == 2  # nothing, then one and the same
         assert "centimetres or millimetres" in ticks[-1].messages[0]
+        names = controller.spots.names if "distances" in given_ and np.ndim(given_["distances"]) == 1 else ()
+        seen = np.isfinite(np.asarray(given_.get("distances", ()), dtype=float)) if names else ()
+        assert ticks[-1].unseen == tuple(name for name, odd in zip(names, seen, strict=True) if odd)
         controller.acknowledge()
     assert FARTHEST_POINT > 50.0

@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.moves import Arc, Dwell, JointMove, JointMoveOfFrame, Line, Move
 from qpsafe.tasks.program import Event, Program
+from qpsafe.tasks.reach import PERIOD, STRIDE, TURN, checked_poses
 from qpsafe.tasks.rotation import exp3, log3
 from qpsafe.tasks.timing import Rates, TimeLaw
 
@@ -189,3 +191,46 @@ def test_moves_can_be_copied_in_mid_run() -> None:
 def test_moves_that_cannot_be_are_refused_by_name(bad: object, key: str) -> None:
     with pytest.raises(ConfigurationError, match=key):
         bad()  # type: ignore[operator]
+
+
+anything = st.floats(-300.0, 300.0).map(lambda x: 10.0**x) | st.floats(1e-3, 1e3)
+
+
+@settings(max_examples=150)
+@given(st.floats(1e-6, 1e3), anything, anything, anything)  # ruckig's own precision is 1e-8
+def test_any_motion_arrives_or_is_refused_by_name(
+    length: float, speed: float, acceleration: float, jerk: float
+) -> None:
+    """However large, small or far apart the rates are; ruckig's own errors never come out."""
+    try:
+        law = TimeLaw([0.0], [length], [speed], [acceleration], [jerk])
+    except qpsafe.ConfigurationError as error:
+        assert error.key in ("goal", "speed", "acceleration", "jerk")  # noqa: PT017
+        return
+    assert 0.0 < law.duration < math.inf
+    assert law.at(law.duration).position == pytest.approx([length])
+    assert law.at(math.nextafter(law.duration, 0.0)).position == pytest.approx([length], rel=1e-6, abs=2e-8)
+    for share in (0.1, 0.3, 0.5, 0.7, 0.9):
+        motion = law.at(share * law.duration)
+        assert abs(motion.velocity[0]) <= speed * (1.0 + 1e-6)
+        assert abs(motion.acceleration[0]) <= acceleration * (1.0 + 1e-6)
+
+
+rates = st.builds(Rates, *[st.floats(1e-4, 1e2)] * 3)
+
+
+@settings(max_examples=60)
+@given(rates, rates, st.floats(0.0, 1.0), st.floats(0.01, 3.0))
+def test_a_path_is_checked_densely_and_no_more_often_than_its_way_needs(
+    linear: Rates, angular: Rates, length: float, angle: float
+) -> None:
+    """Between two checked poses lie 20 ms, or at most 5 mm and 0.016 rad; a slower motion needs no more of them."""
+    goal = np.eye(4)
+    goal[:3, :3], goal[0, 3] = exp3(np.array([0.0, 0.0, angle])), length
+    line = Line(np.eye(4), goal, linear, angular)
+    count = checked_poses(line)
+    assert count <= 2.0 * max(length / STRIDE, angle / TURN) + 1.0
+    if line.duration / count > PERIOD * (1.0 + 1e-9):
+        u = [line.law.at(line.duration * k / count).position[0] for k in range(count + 1)]
+        assert max(np.diff(u)) * length <= STRIDE * (1.0 + 1e-6)
+        assert max(np.diff(u)) * angle <= TURN * (1.0 + 1e-6)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import qpsafe
+from qpsafe.cli.stream import _controller
 from qpsafe.tasks.lines import line_of
 from qpsafe.tasks.program_file import ProgramError, load_program
 
@@ -229,6 +230,32 @@ def test_too_fast_for_a_joint_is_refused_by_its_name(tmp_path: Path) -> None:
     )
     with pytest.raises(ProgramError, match=r"segment\[1\].to.*joint_\d needs"):
         load_program(write(tmp_path, text), robot)
+
+
+OWN = """<mujoco model="own"><worldbody><body name="base"><body name="upper">
+<joint name="shoulder" axis="0 0 1" range="-60 100" limited="true"/><geom type="box" size="0.2 0.05 0.05"/>
+<body name="fore" pos="0.5 0 0"><joint name="elbow" axis="0 1 0" range="-100 100" limited="true"/>
+<geom type="box" size="0.05 0.05 0.1"/><site name="grip" pos="0.25 0 0"/></body></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore::qpsafe.errors.RobotWarning")
+@pytest.mark.parametrize("name", [*qpsafe.bundled_robots(), "own"])
+def test_a_program_without_a_frame_is_followed_by_the_first_tool(tmp_path: Path, name: str) -> None:
+    """Whatever a robot calls its tool's tip, `qpsafe stream --program` needs no key for it."""
+    if name == "own":
+        (tmp_path / "own.xml").write_text(OWN)
+        name = str(tmp_path / "own.xml")
+    own = qpsafe.load_robot(name)
+    path = write(tmp_path, '[[segment]]\ndo = "dwell"\ntime = 1.0\n')
+    assert load_program(path, own).frame == own.tool_frames[0]
+    controller = _controller(name, path, None, None, None)
+    assert {task.frame for task in controller.tasks} == {own.tool_frames[0]}  # type: ignore[attr-defined]
+    path.write_text(f'frame = "{own.frame_names[1]}"\n' + path.read_text())
+    assert load_program(path, own).frame == own.frame_names[1]
+    path.write_text(path.read_text().replace(own.frame_names[1], "no such frame"))
+    with pytest.raises(ProgramError, match="without this key") as caught:
+        load_program(path, own)
+    assert repr(own.tool_frames[0]) in caught.value.expected
 
 
 def test_lines_of_keys() -> None:
