@@ -139,7 +139,7 @@ def check(s: State, info: Index, solved: int, rows: int) -> None:
     for row in range(solved):
         c, value = n + row, dot(A, row, x)
         change = abs(value - kept[row]) if kind[c] == ABSENT else max(value - high[c], low[c] - value)
-        if not change <= 1e-8 * size_of(A, row, x):
+        if not change <= 0.0 and not change <= 1e-8 * size_of(A, row, x):
             info[0], info[2] = INEXACT, row
     fine = True
     for c in range(n + rows):

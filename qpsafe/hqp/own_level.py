@@ -181,7 +181,6 @@ def minimise_level(
             alpha, met = ratio_test(s, first, last, turn > BLAND)
             for i in range(n):
                 x[i] = min(max(x[i] + alpha * d[i], low[i]), high[i])
-                reach[0] = max(reach[0], abs(x[i]))
             for j in range(w):
                 c = working[j]
                 if c < n:
@@ -196,6 +195,8 @@ def minimise_level(
                 chosen[count] = met - n - first
                 count += 1
             continue
+        for i in range(n):
+            reach[0] = max(reach[0], abs(x[i]))
         if w == 0 and inequalities == 0:
             break
         size = max(residuals(s, first, last, count), norm * reach[0])
