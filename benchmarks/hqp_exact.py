@@ -14,6 +14,7 @@ from math import gcd, inf, lcm
 import numpy as np
 
 Row = list[int]
+TURNS = 1000  # of the active-set method; far more than it needs
 
 
 def eliminate(rows: list[Row], columns: int) -> tuple[list[Row], list[int]]:
@@ -105,9 +106,10 @@ class Exact:
         """The bounded quantity of constraint c."""
         return dot(self.normals[c], self.x) / self.scales[c]
 
-    def minimise(self, A, low, high) -> None:
+    def minimise(self, A, low, high, weight=None) -> None:
         """One level `low <= A x <= high`, least squares of the violations; then it is fixed for the levels below."""
         n, rows = self.n, [[Fraction(float(a)) for a in row] for row in A]
+        weight = [Fraction(1)] * len(rows) if weight is None else [Fraction(float(a)) for a in weight]
         low = [-inf if a == -inf else Fraction(float(a)) for a in low]
         high = [inf if a == inf else Fraction(float(a)) for a in high]
         side = {}  # rows that count: 0 equality, -1 below, +1 above
@@ -117,15 +119,15 @@ class Exact:
                 side[i] = 0
             elif value > high[i] or value < low[i]:
                 side[i] = 1 if value > high[i] else -1
-        while True:
+        for _ in range(TURNS):
             basis = null_space(self.fixed + [self.normals[c] for c in self.held], n)
             target = {i: low[i] if s < 0 else high[i] for i, s in side.items()}
             residual = {i: target[i] - dot(rows[i], self.x) for i in side}
             images = {i: [dot(rows[i], b) for b in basis] for i in side}
             k = len(basis)
             normal = [
-                [sum((images[i][a] * images[i][b] for i in side), Fraction(0)) for b in range(k)]
-                + [sum((images[i][a] * residual[i] for i in side), Fraction(0))]
+                [sum((weight[i] * images[i][a] * images[i][b] for i in side), Fraction(0)) for b in range(k)]
+                + [sum((weight[i] * images[i][a] * residual[i] for i in side), Fraction(0))]
                 for a in range(k)
             ]
             y = solve_consistent(normal, k) if k else []
@@ -150,7 +152,7 @@ class Exact:
                 (self.held if met[0] == "hold" else side)[met[1]] = met[2]
                 continue
             residual = {i: target[i] - dot(rows[i], self.x) for i in side}
-            gradient = [-sum((rows[i][j] * residual[i] for i in side), Fraction(0)) for j in range(n)]
+            gradient = [-sum((weight[i] * rows[i][j] * residual[i] for i in side), Fraction(0)) for j in range(n)]
             across = self.fixed + [self.normals[c] for c in self.held]
             system = [[Fraction(row[j]) for row in across] + [gradient[j]] for j in range(n)]
             multiplier = solve_consistent(system, len(across))[len(self.fixed) :]
@@ -160,10 +162,17 @@ class Exact:
                 del self.held[wrong]
                 continue
             leaving = [i for i, s in side.items() if residual[i] * s > 0]
-            if leaving:
-                del side[min(leaving)]
+            if leaving:  # met now, or crossed whole: then it counts at its other bound
+                i = min(leaving)
+                value = dot(rows[i], self.x)
+                if low[i] <= value <= high[i]:
+                    del side[i]
+                else:
+                    side[i] = -side[i]
                 continue
             break
+        else:
+            raise RuntimeError("the exact solver does not end")
         for i, row in enumerate(rows):
             whole = integers(A[i])
             if low[i] == high[i] or (i in side and residual[i]):
@@ -188,14 +197,14 @@ def solve_exactly(levels, lower, upper, guess) -> np.ndarray:
     """The exact solution, rounded to float64 once at the end.
 
     Args:
-        levels: `(A, low, high)` triples, highest priority first; hard rows go first.
+        levels: `(A, low, high)` or `(A, low, high, weight)`, highest priority first; hard rows go first.
         lower: (n,) box.
         upper: (n,) box.
         guess: (n,) approximate solution; decides how long it takes, not what comes out.
     """
     state = Exact(lower, upper, guess)
     n = len(lower)
-    for A, low, high in levels:
-        state.minimise(A, low, high)
+    for level in levels:
+        state.minimise(*level)
     state.minimise(np.eye(n), np.zeros(n), np.zeros(n))
     return np.array([float(a) for a in state.x])

@@ -30,7 +30,7 @@ from qpsafe.hqp.own_linear import Array, Index, dot
 from qpsafe.hqp.own_state import ABSENT, LOCKED, State, cut, load_box, load_rows
 
 # codes in info[0]
-OK, ROWS, TURNS, DATA, LIMITS, INEXACT, FAILED = range(7)
+OK, ROWS, TURNS, DATA, LIMITS, INEXACT, FAILED, CONDITION = range(8)
 HEADER = 3  # info = [code, turns, where, then one number a joint and row]
 
 
@@ -105,17 +105,28 @@ def run(
             first = last
         if s.flags[0] == 0:
             break
+    if info[0] == OK and s.flags[1] > 0:
+        info[0], info[2] = CONDITION, s.flags[1] - 1
     # 5. the check
     check(s, info, min(first, rows), rows)
 
 
 @inline
+def size_of(A: Array, row: int, x: Array) -> float:
+    """Σ |a_i| (1 + |x_i|): how much a row changes with joint velocities of 1 rad/s, or of those at hand."""
+    size = 0.0
+    for i in range(x.shape[0]):
+        size += abs(A[row, i]) * (1.0 + abs(x[i]))
+    return size
+
+
+@inline
 def violated(s: State, rows: int) -> bool:
     """Whether one of the first rows is violated at x by more than rounding."""
-    low, high, kept, n = s.low, s.high, s.kept, s.x.shape[0]
+    A, low, high, kept, x, n = s.A, s.low, s.high, s.kept, s.x, s.x.shape[0]
     found = False
     for row in range(rows):
-        c, slack = n + row, 1e-8 * max(1.0, abs(kept[row]))
+        c, slack = n + row, 1e-8 * size_of(A, row, x)
         # a row that is met has become a constraint; a violated one stays what its level asked for
         found = found or kept[row] > high[c] + slack or kept[row] < low[c] - slack
     return found
@@ -126,13 +137,9 @@ def check(s: State, info: Index, solved: int, rows: int) -> None:
     """Judge the result: sets the code if a solved row has moved since its level was left, or x is not in the box."""
     A, low, high, kept, kind, side, x, n = s.A, s.low, s.high, s.kept, s.kind, s.side, s.x, s.x.shape[0]
     for row in range(solved):
-        c = n + row
-        value, size = 0.0, 1.0
-        for i in range(n):
-            value += A[row, i] * x[i]
-            size += abs(A[row, i] * x[i])
+        c, value = n + row, dot(A, row, x)
         change = abs(value - kept[row]) if kind[c] == ABSENT else max(value - high[c], low[c] - value)
-        if not change <= 1e-8 * size:
+        if not change <= 0.0 and not change <= 1e-8 * size_of(A, row, x):
             info[0], info[2] = INEXACT, row
     fine = True
     for c in range(n + rows):

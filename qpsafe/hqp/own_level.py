@@ -4,8 +4,9 @@
 
 Each turn: factorise the rows that count (equalities and rows outside their interval), step towards their least-squares
 point, stop at the first constraint met (ratio test) and hold it; where nothing stops the step, release the constraint
-whose multiplier has the wrong sign (multiplier test), or finish. After `BLAND` turns both choices follow Bland's rule,
-which cannot cycle.
+whose multiplier has the wrong sign (multiplier test), or finish. A row whose residual has the wrong sign is met and no
+longer counts, or it was crossed whole and counts on at its other bound. After `BLAND` turns both choices follow Bland's
+rule, which cannot cycle.
 
 At the end a constraint with a clearly non-zero multiplier is active in every optimum, so it is locked for the levels
 below; the others are released and stay plain inequalities. A row of the level that stays violated keeps its violation
@@ -31,16 +32,26 @@ RANK = 1e-10  # rows shorter than this in the freedom left, relative to their le
 BLAND = 40  # turns after which Bland's rule chooses
 ROUNDING = 2e-14  # relative size below which a wrong sign of a multiplier is rounding
 STRICT = 1e-9  # relative size above which a multiplier is certainly not zero
+EVEN = 1e-5  # rows shorter than this, relative to their level, press with forces near the rounding of the others'
+PARALLEL = 1e-6  # sine of the angle between held constraints below which their multipliers are near rounding
+NOISE = 1e-13  # rows shorter than this, relative to their level, are zero up to the rounding of who computed them
 
 
 @inline
-def choose(s: State, first: int, last: int) -> tuple[int, int, float]:
-    """Which rows count at the start. Returns their number, the number of inequalities, and the norm of the level."""
+def choose(s: State, first: int, last: int) -> tuple[int, int, float, float]:
+    """Which rows count at the start.
+
+    Returns:
+        Their number, the number of inequalities, the norm of the level, and its shortest row relative to that (not
+        larger than 1, and 1 where it does not matter).
+    """
     A, low, high, side, chosen, x, n = s.A, s.low, s.high, s.side, s.chosen, s.x, s.x.shape[0]
-    count, inequalities, square = 0, 0, 0.0
+    count, inequalities, square, least = 0, 0, 0.0, np.inf
     for row in range(first, last):
         c = n + row
-        square += image(A, row, A, row)
+        length = image(A, row, A, row)
+        square += length
+        least = min(least, length)
         if low[c] == high[c]:
             side[c] = 2
         else:
@@ -50,7 +61,27 @@ def choose(s: State, first: int, last: int) -> tuple[int, int, float]:
         if side[c] != 0:
             chosen[count] = row - first
             count += 1
-    return count, inequalities, sqrt(square)
+    if least >= EVEN * EVEN * square:
+        return count, inequalities, sqrt(square), 1.0
+    least = square
+    for row in range(first, last):
+        length = image(A, row, A, row)
+        if length > NOISE * NOISE * square:
+            least = min(least, length)
+    return count, inequalities, sqrt(square), sqrt(least / square) if square > 0.0 else 1.0
+
+
+@inline
+def normalise(s: State, row: int) -> None:
+    """Give a row about unit length: its multiplier is then as large as its force. A power of two rounds nothing."""
+    A, n = s.A, s.x.shape[0]
+    length = sqrt(image(A, row, A, row))
+    if length > 0.0:
+        factor = 2.0 ** -np.floor(np.log2(length))
+        for i in range(n):
+            A[row, i] *= factor
+        s.low[n + row] *= factor
+        s.high[n + row] *= factor
 
 
 @inline
@@ -103,9 +134,9 @@ def minimise_level(
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
     """
     A, low, high, kind, side, x, G = s.A, s.low, s.high, s.kind, s.side, s.x, s.G
-    working, chosen, d, r, u = s.working, s.chosen, s.d, s.r, s.u
+    working, chosen, d, r, u, reach = s.working, s.chosen, s.d, s.r, s.u, s.reach
     n, m = x.shape[0], last - first
-    count, inequalities, norm = choose(s, first, last)
+    count, inequalities, norm, least = choose(s, first, last)
     scale = A[first, 0]
     uniform = m == n and inequalities == 0 and scale > 0.0  # A = scale I: a projection, the usual closing level
     for a in range(m):
@@ -131,12 +162,12 @@ def minimise_level(
         base = start + w
         if uniform:
             rank = n - base
-            size = residuals(s, first, last, count)
+            residuals(s, first, last, count)
             for j in range(rank):
                 u[j] = along(G, base + j, r, n) / scale
         else:
             rank = load_factor(s, start, w, count, tolerance)
-            size = residuals(s, first, last, count)  # after the pivoting, which permutes the rows
+            residuals(s, first, last, count)  # after the pivoting, which permutes the rows
             least_squares(s.F, count, rank, s.diagonal, r, u)
             unturn(s.F, s.tau, rank, n - base, u)
         # go until a constraint is met
@@ -164,9 +195,11 @@ def minimise_level(
                 chosen[count] = met - n - first
                 count += 1
             continue
+        for i in range(n):
+            reach[0] = max(reach[0], abs(x[i]))
         if w == 0 and inequalities == 0:
             break
-        size = residuals(s, first, last, count)
+        size = max(residuals(s, first, last, count), norm * reach[0])
         pivot = multipliers(s, start, w, count, uniform, scale)
         gone = wrong_way(s, first, w, count, inequalities, ROUNDING * norm * size / pivot, norm, turn > BLAND)
         if gone < 0:
@@ -174,11 +207,20 @@ def minimise_level(
         if gone < w:
             release(s, width, start, w, gone)
             w -= 1
+            continue
+        a = gone - w
+        c = n + first + chosen[a]
+        if abs(r[a]) > high[c] - low[c]:  # crossed whole: it counts on, at its other bound
+            side[c] = -side[c]
         else:
-            side[n + first + chosen[gone - w]] = 0
+            side[c] = 0
             count -= 1
-            chosen[gone - w] = chosen[count]
+            chosen[a] = chosen[count]
 
+    # whether signs of multipliers decided where rounding may be as large as they are, or rows were left out
+    decided = w > 0 or count > m - inequalities
+    if least < RANK or (decided and (least < EVEN or pivot < PARALLEL)):
+        s.flags[1] = max(s.flags[1], level + 1)
     # lock what is active in every optimum, release the rest
     released = False
     for j in range(w - 1, -1, -1):
@@ -200,6 +242,7 @@ def minimise_level(
         for row in range(first, last):
             c = n + row
             if side[c] == 0:
+                normalise(s, row)
                 value = dot(A, row, x)
                 low[c], high[c], kind[c] = min(low[c], value), max(high[c], value), FREE
     if uniform:

@@ -74,22 +74,28 @@ def wrong_way(
 ) -> int:
     """Working constraint j, or w + index of the chosen row, that pushes the wrong way most; -1 if none does.
 
-    λ must be >= 0 at a lower bound and <= 0 at an upper one; the residual of a row is its multiplier.
+    λ must be >= 0 at a lower bound and <= 0 at an upper one; the residual of a row is its multiplier. `careful` takes
+    the lowest number instead of the worst (Bland).
     """
     side, working, chosen, u, r, n = s.side, s.working, s.chosen, s.u, s.r, s.x.shape[0]
-    worst, gone = threshold, -1
+    worst, gone, lowest = threshold, -1, side.shape[0]
     for j in range(w):
         wrong = u[j] * side[working[j]]
-        if wrong > worst:
-            gone, worst = j, wrong
+        if wrong > worst and working[j] < lowest:
+            gone = j
             if careful:
-                return gone
+                lowest = working[j]
+            else:
+                worst = wrong
+    if inequalities == 0:
+        return gone
     for a in range(count):
-        pressed = side[n + first + chosen[a]] if inequalities else 2
-        if pressed != 2:
-            wrong = norm * r[a] * pressed
-            if wrong > worst:
-                gone, worst = w + a, wrong
-                if careful:
-                    return gone
+        c = n + first + chosen[a]
+        wrong = norm * r[a] * side[c]
+        if side[c] != 2 and wrong > worst and c < lowest:
+            gone = w + a
+            if careful:
+                lowest = c
+            else:
+                worst = wrong
     return gone

@@ -37,7 +37,9 @@ class State(NamedTuple):
         r: (m,) residuals of the chosen rows.
         u: (n + m,) solution in basis coordinates, then multipliers.
         tau: (n,) reflections of F; diagonal: (n,) of L; scratch: (n + m,).
-        reference: (n,) solution without the nearly singular directions, see `own_damping`; flags: (1,) how many.
+        reach: (1,) largest joint velocity on the way so far, which all later rounding is relative to.
+        reference: (n,) solution without the nearly singular directions, see `own_damping`; flags: (2,) how many, and
+            one more than the last ill-conditioned level, 0 for none.
     """
 
     A: Array
@@ -58,19 +60,20 @@ class State(NamedTuple):
     tau: Array
     diagonal: Array
     scratch: Array
+    reach: Array
     reference: Array
     flags: Index
 
 
 def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
     """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level."""
-    return np.zeros(floats_of(n, rows, m)), np.zeros(2 * (n + rows + 2 * n) + n + m + n + 1, np.int64)
+    return np.zeros(floats_of(n, rows, m)), np.zeros(2 * (n + rows + 2 * n) + n + m + n + 2, np.int64)
 
 
 def floats_of(n: int, rows: int, m: int) -> int:
     """How many floats `workspace` has, exactly."""
     rows, m = rows + 2 * n, m + n  # the closing identity, and rows that damping adds
-    return rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 3 * n
+    return rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 1 + 3 * n
 
 
 @inline
@@ -85,11 +88,13 @@ def cut(f: Array, i: Index, x: Array, rows: int, m: int) -> State:
     low, high, kept, at = view(f, at, (c,)), view(f, at + c, (c,)), view(f, at + 2 * c, (c,)), at + 3 * c
     d, u, at = view(f, at, (width,)), view(f, at + width, (width,)), at + 2 * width
     scratch, r, at = view(f, at, (width,)), view(f, at + width, (m,)), at + width + m
+    reach, at = view(f, at, (1,)), at + 1
     tau, diagonal, reference = view(f, at, (n,)), view(f, at + n, (n,)), view(f, at + 2 * n, (n,))
     kind, side, at = view(i, 0, (c,)), view(i, c, (c,)), 2 * c
-    working, chosen, flags = view(i, at, (n,)), view(i, at + n, (m,)), view(i, at + n + m, (1,))
+    working, chosen, flags = view(i, at, (n,)), view(i, at + n, (m,)), view(i, at + n + m, (2,))
     return State(
-        A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch, reference, flags
+        A, low, high, kept, kind, side, x, G, R, F, working, chosen, d, r, u, tau, diagonal, scratch, reach, reference,
+        flags,
     )  # fmt: skip
 
 
@@ -107,6 +112,7 @@ def load_box(s: State, box_low: Array, box_high: Array) -> int:
             low[i] = box_low[i] if box_low[i] > -HUGE else -np.inf
             high[i] = box_high[i] if box_high[i] < HUGE else np.inf
             x[i] = min(max(0.0, low[i]), high[i])
+            s.reach[0] = max(s.reach[0], abs(x[i]))
         else:
             good = False
             x[i] = 0.0

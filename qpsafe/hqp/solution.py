@@ -17,6 +17,7 @@ SOLVED = "solved"
 ROWS_INFEASIBLE = "rows infeasible"
 STOPPED = "stopped early"
 INEXACT = "inexact"
+ILL_CONDITIONED = "ill-conditioned"
 FAILED = "failed"
 INVALID_DATA = "invalid data"
 INVALID_LIMITS = "invalid limits"
@@ -26,6 +27,7 @@ MEANING = {
     ROWS_INFEASIBLE: "the hard rows contradict the box or each other: least violation of them, box met",
     STOPPED: "a level was not finished: limits met, optimal down to the level before",
     INEXACT: "the check found a level worse than it was when solved: limits met",
+    ILL_CONDITIONED: "rows of a level differ in size by 1e5, or limits are nearly parallel: limits met, rest uncertain",
     FAILED: "numbers overflowed: the point of the box nearest to standstill",
     INVALID_DATA: "a level holds NaN, infinite or unusable numbers: the point of the box nearest to standstill",
     INVALID_LIMITS: "limits hold NaN or lower > upper: standstill, or the nearest allowed speed where limits are valid",

@@ -14,6 +14,7 @@ from qpsafe.hqp.level import Level
 from qpsafe.hqp.packing import Packed, pack, unpack
 from qpsafe.hqp.solution import (
     FAILED,
+    ILL_CONDITIONED,
     INEXACT,
     INVALID_DATA,
     INVALID_LIMITS,
@@ -25,7 +26,17 @@ from qpsafe.hqp.solution import (
 
 Array = NDArray[np.float64]
 
-STATUS = (SOLVED, ROWS_INFEASIBLE, STOPPED, INVALID_DATA, INVALID_LIMITS, INEXACT, FAILED)  # codes of own_hierarchy
+STATUS = (
+    SOLVED,
+    ROWS_INFEASIBLE,
+    STOPPED,
+    INVALID_DATA,
+    INVALID_LIMITS,
+    INEXACT,
+    FAILED,
+    ILL_CONDITIONED,
+)  # own_hierarchy
+WORSE = 1e-8  # an answer whose level is worse than the judge's by more than this, relative above 1, is not returned
 _solve_packed: Callable[..., tuple[Array, NDArray[np.int64]]] | None = None
 
 
@@ -56,8 +67,10 @@ def solve_hierarchy(
             nothing. 0 means none. Own solver only.
 
     Returns:
-        The solution. Bad data never raise: `status` tells, and `qd` is finite and inside the box (a joint whose own
-        limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
+        The solution. "solved" means optimal at every level to rounding, in any units of levels and hard rows; where
+        rows of one level are so different in size that rounding decides, the status is "ill-conditioned" (figures:
+        docs/hierarchical-qp.md). Bad data never raise: `status` tells, and `qd` is finite and inside the box (a joint
+        whose own limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
 
     Raises:
         ConfigurationError: for shapes that do not fit and unknown solvers.
@@ -118,17 +131,22 @@ def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
         own.note = f"{solver} failed{f' at {_name(problem, failures[0])}' if failures else ''}, the own solver answered"
         return own
     solution = Solution(qd, own.status, turns, solver, perf_counter() - begin, problem)
-    worse = _worse_level(solution.costs, own.costs)
+    worse = _worse_level((*solution.costs, _norm(qd)), (*own.costs, _norm(own.qd)))
     if worse is not None:
         own.note = f"{solver} was worse at {_name(problem, worse)}, the own solver answered"
         return own
     return solution
 
 
+def _norm(qd: Array) -> float:
+    """What is minimised after the last level."""
+    return float(np.sqrt(qd @ qd))
+
+
 def _worse_level(costs: Sequence[float], judge: Sequence[float]) -> int | None:
     """The first level at which the costs are lexicographically worse than the judge's, None if they are not."""
     for k, (theirs, ours) in enumerate(zip(costs, judge, strict=True)):
-        tolerance = 1e-6 * max(1.0, ours)
+        tolerance = WORSE * max(1.0, ours)
         if not theirs <= ours + tolerance:
             return k
         if theirs < ours - tolerance:

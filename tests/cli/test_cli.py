@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -121,6 +122,38 @@ def test_compare_is_honest_in_its_exit_code() -> None:
     result = run(app, [*arguments, "--tolerance", "1e-30"])
     assert result.exit_code == 1
     assert json.loads(result.stdout)["good"] is False
+
+
+@pytest.mark.parametrize(
+    ("options", "sample"),
+    [
+        ([], (7_000, 25.0)),
+        (["--full"], (10_000, 60.0)),
+        (["--states", "54"], (54, 25.0)),
+        (["--full", "--duration", "3"], (10_000, 3.0)),
+    ],
+)
+def test_compare_states_its_sample(monkeypatch: pytest.MonkeyPatch, options: list[str], sample: tuple) -> None:
+    from qpsafe.laws import equivalence
+    from qpsafe.sim import compare
+
+    asked = []
+
+    def states(law, count, seed, limits, progress):
+        asked.append(count)
+        return [equivalence.Deviation("all", np.zeros(count), np.zeros(count))]
+
+    def runs(robot, duration, solver, progress):
+        asked.append(duration)
+        return compare.ClosedLoop(duration, *8 * (0,))
+
+    monkeypatch.setattr(equivalence, "compare_states", states)
+    monkeypatch.setattr(compare, "compare_closed_loop", runs)
+    result = run(app, ["compare", "--json", *options])
+    said = json.loads(result.stdout)["sample"]
+    others = min(sample[0], 1_000)
+    assert (said["states"], said["duration"]) == sample
+    assert asked == [sample[0], sample[0], others, others, others, sample[1]]
 
 
 def test_robots_lists_and_inspects() -> None:

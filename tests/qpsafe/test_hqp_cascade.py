@@ -29,22 +29,23 @@ def problems(count):
 
 
 @pytest.mark.parametrize(
-    ("solver", "tolerance"), [("daqp", 1e-6), ("proxqp", 1e-7), ("qpsolvers:daqp", 1e-5), ("qpsolvers:proxqp", 1e-3)]
+    ("solver", "least"), [("daqp", 70), ("proxqp", 70), ("qpsolvers:daqp", 75), ("qpsolvers:proxqp", 60)]
 )
-def test_agrees_with_the_own_solver(solver, tolerance):
+def test_agrees_with_the_own_solver(solver, least):
+    answered = 0
     for levels, lower, upper in problems(80):
         own, other = (
             solve_hierarchy(levels, lower, upper),
             solve_hierarchy(levels, lower, upper, solver),
         )
+        answered += other.solver == solver  # and not the own solver in its place
         assert other.status == "solved"
         assert np.all(other.qd >= lower)
         assert np.all(other.qd <= upper)
         # compared by what they achieve: a nearly dependent active set leaves q̇ itself ill-defined
         for ours, theirs in zip(own.residuals, other.residuals, strict=True):
-            if abs(theirs - ours) > tolerance:
-                assert theirs > ours  # the first difference is in our favour
-                break
+            assert abs(theirs - ours) <= 1e-7
+    assert answered >= least
 
 
 @pytest.mark.parametrize("answer", [None, "nan", "outside", "raise"])

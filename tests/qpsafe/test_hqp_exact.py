@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-
+import hqp_exact as exact
+import hqp_family as family
 import numpy as np
 import pytest
 
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
-
-
-def load(name):
-    """A module of the benchmarks, which are scripts and no package."""
-    path = Path(__file__).parents[2] / "benchmarks" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-exact, family = load("hqp_exact"), load("hqp_family")
 
 
 def triples(hierarchy):
