@@ -180,6 +180,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         chains=tuple(chains),
         danger=None if danger is None else ((danger.delta, danger.epsilon), (danger.delta_f, danger.epsilon_f)),
         regions=regions,
+        external_joints=None if file.egm is None else tuple(file.egm.external),
     )
 
 

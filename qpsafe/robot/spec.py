@@ -90,6 +90,7 @@ class RobotSpec:
         spots_path: File of distance sensors, or None where there is none.
         manufacturer: Who makes it.
         regions: Parts of the surface that may carry distance sensors.
+        external_joints: Joints that an ABB controller takes for external ones, in its order; None for the usual ones.
     """
 
     name: str
@@ -111,3 +112,4 @@ class RobotSpec:
     spots_path: Path | None = None
     manufacturer: str = ""
     regions: tuple[Region, ...] = ()
+    external_joints: tuple[str, ...] | None = None
