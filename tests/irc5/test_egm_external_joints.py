@@ -1,4 +1,4 @@
-"""A seventh axis and external joints go through EGM's `externalJoints` both ways, in the controller's order and units."""
+"""A seventh axis and external joints go through EGM's `externalJoints` both ways, in the controller's order."""
 
 from __future__ import annotations
 
