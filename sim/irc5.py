@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.irc5.axes import Axes, axes_of
 from qpsafe.irc5.messages import WRAP, MalformedPacket, RobotPacket, SensorPacket, decode_sensor
 from qpsafe.sim.irc5_motion import EgmSettings, MotionLaw
 
@@ -94,6 +95,7 @@ class SimulatedIrc5:
         body: What it moves.
         settings: Of EGM.
         dt: Cycle [s].
+        axes: Which joints are external; by default those from the seventh on.
 
     Attributes:
         motors_on: Whether the motors are on.
@@ -106,8 +108,11 @@ class SimulatedIrc5:
 
     SETUP = 0.02  # from the start of EGM until EGMRunJoint runs [s]
 
-    def __init__(self, body: Body, settings: EgmSettings | None = None, dt: float = 0.004) -> None:
+    def __init__(
+        self, body: Body, settings: EgmSettings | None = None, dt: float = 0.004, axes: Axes | None = None
+    ) -> None:
         self.body, self.dt = body, dt
+        self.axes = axes_of(len(body.q)) if axes is None else axes
         self.settings = EgmSettings() if settings is None else settings
         self.law = MotionLaw(self.settings, dt, body.q)
         self.counts = Counts()
@@ -193,7 +198,7 @@ class SimulatedIrc5:
         answers = []
         for data in datagrams:
             try:
-                answers.append(decode_sensor(data, len(self.law.q)))
+                answers.append(decode_sensor(data, self.axes))
             except MalformedPacket:
                 self.counts.rejected += 1
         self.take(answers)

@@ -75,7 +75,9 @@ class Workbench:
         start = joints_for(robot, "tcp", program.sample(0.0).pose, robot.home)
         self.robot, self.program = robot, program
         self.here = Here(SafetyController(robot, tasks))
-        self.irc5 = SimulatedIrc5(IdealBody(start), EgmSettings(comm_timeout=0.5, retry=0.2))
+        self.irc5 = SimulatedIrc5(
+            IdealBody(start), EgmSettings(comm_timeout=0.5, retry=0.2), axes=self.here.loop.session.axes
+        )
         self.irc5.seq = seq
         self.out, self.back = (Wire(NO_FAULTS, np.random.default_rng((seed, k))) for k in range(2))
         self.spoil: Callable[[RobotPacket | None, Datagrams], Datagrams] | None = None
@@ -98,7 +100,7 @@ class Workbench:
         packet = irc5.packet()
         irc5.receive(came)
         if packet is not None:
-            self.out.put(encode_robot(packet))
+            self.out.put(encode_robot(packet, irc5.axes))
         datagrams: Datagrams = [(data, ROBOT_ADDRESS) for data in self.out.take()]
         if self.spoil is not None:
             datagrams = self.spoil(packet, datagrams)

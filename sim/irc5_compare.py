@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
+from qpsafe.irc5.axes import axes_of_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments import experiment_loop
 from qpsafe.sim.irc5_here import Here
@@ -167,7 +168,7 @@ def over_the_wire(
     name: str, robot: Robot, duration: float, settings: EgmSettings, *options: str, lockstep: bool, cycles: int = 0
 ) -> tuple[Course, RobotRun, dict[str, Any]]:
     """The same with `qpsafe stream` in a process of its own: its course, what the robot saw, the stream's report."""
-    with contextlib.closing(UdpExchange(robot.nq, None, lockstep=5.0 if lockstep else 0.0)) as exchange:
+    with contextlib.closing(UdpExchange(axes_of_robot(robot), None, lockstep=5.0 if lockstep else 0.0)) as exchange:
         events = "{}:{}".format(*exchange.events)
         with stream_process("--experiment", name, "--events", events, *options) as stream:
             exchange.aim(stream.addresses["the robot"], stream.addresses["distances"])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
+from qpsafe.irc5.axes import axes_of_robot
 from qpsafe.irc5.loop import LoopRules, StreamLoop
 from qpsafe.irc5.messages import RobotPacket, SensorPacket, decode_sensor, encode_robot
 from qpsafe.irc5.rules import SessionRules
@@ -41,7 +42,10 @@ class Here:
     ) -> None:
         self.now = 0.0
         self.dt = controller.dt
-        session = EgmSession(session_limits(controller), session_rules, joint_names=controller.robot.joint_names)
+        robot = controller.robot
+        session = EgmSession(
+            session_limits(controller), session_rules, joint_names=robot.joint_names, axes=axes_of_robot(robot)
+        )
         self.loop = StreamLoop(controller, session, Supervisor(self.clock), rules)
         self.cycle: Cycle | None = None
         self._heard = 0.0
@@ -52,10 +56,10 @@ class Here:
 
     def swap(self, packet: RobotPacket | None, distances: Array) -> tuple[Sequence[SensorPacket], Sequence[str]]:
         """See `Exchange`."""
-        datagrams = [] if packet is None else [(encode_robot(packet), ROBOT_ADDRESS)]
+        datagrams = [] if packet is None else [(encode_robot(packet, self.loop.session.axes), ROBOT_ADDRESS)]
         answers = self.receive(datagrams, distances)
-        n = self.loop.session.n
-        return [decode_sensor(data, n) for data in answers], self.loop.take_events()
+        axes = self.loop.session.axes
+        return [decode_sensor(data, axes) for data in answers], self.loop.take_events()
 
     def receive(
         self, datagrams: Sequence[tuple[bytes, tuple[str, int]]], distances: Array | None, age: float = 0.0

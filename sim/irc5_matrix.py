@@ -5,11 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import signal
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import QpsafeError
 from qpsafe.limits import JointLimits
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.irc5_bench import Turn, Workbench
@@ -95,6 +98,9 @@ def run_faults(
         jobs: Processes, where the system can fork; 1 elsewhere.
         progress: Called with moments done and to do.
         latest: Tick before which all moments lie.
+
+    Raises:
+        QpsafeError: A worker process died.
     """
     rng = np.random.default_rng(seed)
     moments = np.sort(rng.integers(EARLIEST, latest, size=count)).tolist()
@@ -107,14 +113,16 @@ def run_faults(
     done: list[list[Outcome]] = []
     if jobs > 1 and "fork" in multiprocessing.get_all_start_methods():
         _WORK[:] = work
-        with multiprocessing.get_context("fork").Pool(jobs, initializer=_plain_signals) as pool:
-            for outcomes in pool.imap(_inherited, range(count)):
-                done.append(outcomes)
-                if progress is not None:
-                    progress(len(done), count)
-            pool.close()
-            pool.join()
-        _WORK.clear()
+        try:
+            with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork"), _plain_signals) as pool:
+                for outcomes in pool.map(_inherited, range(count)):
+                    done.append(outcomes)
+                    if progress is not None:
+                        progress(len(done), count)
+        except BrokenProcessPool:
+            raise QpsafeError(f"a worker process died after {len(done)} of {count} moments (out of memory?)") from None
+        finally:
+            _WORK.clear()
     else:
         for item in work:
             done.append(_moment(*item))

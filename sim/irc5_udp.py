@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError, QpsafeError
+from qpsafe.irc5.axes import Axes, axes_of
 from qpsafe.irc5.distances import SensorOutput
 from qpsafe.irc5.messages import MAX_SIZE, MalformedPacket, RobotPacket, SensorPacket, decode_sensor, encode_robot
 from qpsafe.sim.irc5_link import NO_FAULTS, Wire, WireFaults
@@ -27,7 +28,7 @@ class UdpExchange:
     """One robot's end of the wire; see `qpsafe.sim.irc5_loop.Exchange`.
 
     Args:
-        joints: How many the robot has.
+        joints: How many the robot has, or which of them are external.
         stream: Address of `qpsafe stream`; None: `aim` tells it later.
         sensors: Where distances go, None for nowhere.
         faults: Of the wire, both ways.
@@ -44,7 +45,7 @@ class UdpExchange:
 
     def __init__(
         self,
-        joints: int,
+        joints: int | Axes,
         stream: tuple[str, int] | None,
         sensors: tuple[str, int] | None = None,
         *,
@@ -57,7 +58,7 @@ class UdpExchange:
     ) -> None:
         if not 0.0 <= strangers <= 1.0:
             raise ConfigurationError("UdpExchange", "strangers", strangers, "0 to 1")
-        self._n, self.strangers = joints, strangers
+        self._axes, self.strangers = axes_of(joints) if isinstance(joints, int) else joints, strangers
         self._socket, self._stranger, self._events = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in "123")
         try:
             self._events.bind(("127.0.0.1", event_port))
@@ -101,10 +102,10 @@ class UdpExchange:
         if self._sensors is not None:
             self._sensors.send(distances)
         if packet is not None:
-            self.out.put(encode_robot(packet))
+            self.out.put(encode_robot(packet, self._axes))
             if self._rng.random() < self.strangers:
                 other = RobotPacket(packet.seq + 1, packet.time_ms, packet.q + 0.5, clock=packet.clock)
-                self._send(self._stranger, encode_robot(other))
+                self._send(self._stranger, encode_robot(other, self._axes))
         for data in self.out.take():
             self._send(self._socket, data)
         if self._lockstep and packet is not None:
@@ -112,7 +113,7 @@ class UdpExchange:
         answers = []
         for data in came:
             try:
-                answers.append(decode_sensor(data, self._n))
+                answers.append(decode_sensor(data, self._axes))
             except MalformedPacket:
                 self.rejected += 1
         return answers, self._names()

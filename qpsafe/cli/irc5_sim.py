@@ -72,6 +72,7 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
+    from qpsafe.irc5.axes import axes_of_robot
     from qpsafe.irc5.requests import Requests
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments import experiment_loop
@@ -106,7 +107,7 @@ def irc5_sim(
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(
-        found.nq,
+        axes_of_robot(found),
         (host, port),
         (host, sensor_port) if sensor_port else None,
         event_port=event_port,

@@ -102,6 +102,7 @@ def stream(
         screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
         from qpsafe.cli.stream_report import result_of, show
         from qpsafe.cli.stream_speaker import Speaker
+        from qpsafe.irc5.axes import axes_of_robot
         from qpsafe.irc5.distances import SensorInput
         from qpsafe.irc5.event_output import EventOutput
         from qpsafe.irc5.loop import LoopRules, StreamLoop
@@ -125,7 +126,8 @@ def stream(
             stack.callback(inlet.close)
         names = controller.robot.joint_names
         rules = SessionRules(ramp_in=ramp_in, ramp_out=ramp_out)
-        streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names)
+        axes = axes_of_robot(controller.robot)
+        streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names, axes)
         stack.callback(streamer.close)
         warm_up(controller, blind)
         dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None

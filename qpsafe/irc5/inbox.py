@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.irc5.axes import Axes, axes_of
 from qpsafe.irc5.messages import REASONS, WRAP, MalformedPacket, RobotPacket, decode_robot
 from qpsafe.irc5.rules import SessionRules
 
@@ -54,6 +55,7 @@ class Inbox:
         lower, upper: Joint limits (n,) [rad], may be infinite.
         rules: `silence`, `most_missed` and `margin` of them.
         peer: Address of the robot; by default that of the first valid packet, from then on.
+        axes: Which joints are external; by default those from the seventh on.
 
     Attributes:
         counts: Datagrams by what became of them: ``accepted``, or one of `REFUSALS`; ``missed``, ``restarts``.
@@ -67,7 +69,9 @@ class Inbox:
         upper: NDArray[np.float64],
         rules: SessionRules | None = None,
         peer: str | None = None,
+        axes: Axes | None = None,
     ) -> None:
+        self._axes = axes_of(len(lower)) if axes is None else axes
         self.rules = SessionRules() if rules is None else rules
         self._lowest = np.maximum(lower - self.rules.margin, -_ABSURD)
         self._highest = np.minimum(upper + self.rules.margin, _ABSURD)
@@ -94,7 +98,7 @@ class Inbox:
         try:
             if not self._known(sender, silent):
                 raise MalformedPacket(WRONG_SENDER, f"{sender[0]}:{sender[1]} is not the robot")
-            packet = decode_robot(data, len(self._lowest))
+            packet = decode_robot(data, self._axes)
             kind, missed = self._check(packet, silent)
         except MalformedPacket as problem:
             self.counts[problem.reason] += 1

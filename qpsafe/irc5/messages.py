@@ -1,4 +1,4 @@
-"""EGM messages: radians inside, degrees on the wire; what arrives is checked, and refused with a reason."""
+"""EGM messages: SI units inside, degrees and mm on the wire; what arrives is checked, and refused with a reason."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import MissingExtraError, QpsafeError
+from qpsafe.irc5.axes import Axes, axes_of
 
 try:
     _wire: Any = import_module("qpsafe.irc5.qpsafe_egm_pb2")
@@ -92,16 +93,22 @@ class SensorPacket:
     qd_ref: NDArray[np.float64]
 
 
-def encode_robot(packet: RobotPacket) -> bytes:
-    """An EgmRobot datagram. Numbers are not checked: a simulated robot may send what it likes."""
+def encode_robot(packet: RobotPacket, axes: Axes | None = None) -> bytes:
+    """An EgmRobot datagram. Numbers are not checked: a simulated robot may send what it likes.
+
+    Args:
+        packet: What it says.
+        axes: Which joints are external; by default those from the seventh on.
+    """
+    axes = axes_of(len(packet.q)) if axes is None else axes
     message = _wire.EgmRobot()
     _set_header(message.header, packet.seq, packet.time_ms, _wire.EgmHeader.DATA)
-    message.feedBack.joints.joints.extend(np.rad2deg(packet.q).tolist())
+    axes.write(message.feedBack, packet.q * axes.to_wire)
     if packet.clock is not None:
         seconds, micros = divmod(round(packet.clock * 1e6), 1_000_000)
         message.feedBack.time.sec, message.feedBack.time.usec = seconds, micros
     if packet.q_planned is not None:
-        message.planned.joints.joints.extend(np.rad2deg(packet.q_planned).tolist())
+        axes.write(message.planned, packet.q_planned * axes.to_wire)
     message.motorState.state = _wire.EgmMotorState.ON if packet.motors_on else _wire.EgmMotorState.OFF
     message.mciState.state = MCI_STATES.index(packet.mci)
     message.rapidExecState.state = RAPID_STATES.index(packet.rapid)
@@ -109,8 +116,8 @@ def encode_robot(packet: RobotPacket) -> bytes:
     return message.SerializeToString()
 
 
-def decode_robot(data: bytes, n: int) -> RobotPacket:
-    """Read an EgmRobot datagram of a robot with n joints.
+def decode_robot(data: bytes, n: int | Axes) -> RobotPacket:
+    """Read an EgmRobot datagram of a robot with n joints, or with these axes.
 
     States that are missing or unknown are taken for the safe ones: motors off, ``undefined``, not converged.
 
@@ -121,12 +128,12 @@ def decode_robot(data: bytes, n: int) -> RobotPacket:
     _check_header(message, _wire.EgmHeader.DATA)
     feedback = message.feedBack
     clock = (feedback.time.sec * 1_000_000 + feedback.time.usec) / 1e6 if _timed(feedback) else None
-    planned = message.planned.joints.joints
+    axes, planned = axes_of(n) if isinstance(n, int) else n, message.planned
     return RobotPacket(
         seq=message.header.seqno,
         time_ms=message.header.tm,
-        q=_radians("feedBack.joints", feedback.joints.joints, n),
-        q_planned=_radians("planned.joints", planned, n) if planned else None,
+        q=_radians("feedBack", feedback, axes),
+        q_planned=_radians("planned", planned, axes) if _given(planned) else None,
         motors_on=message.motorState.state == _wire.EgmMotorState.ON,
         mci=MCI_STATES[message.mciState.state],
         rapid=RAPID_STATES[message.rapidExecState.state],
@@ -135,36 +142,40 @@ def decode_robot(data: bytes, n: int) -> RobotPacket:
     )
 
 
-def encode_sensor(packet: SensorPacket) -> bytes:
-    """An EgmSensor datagram.
+def encode_sensor(packet: SensorPacket, axes: Axes | None = None) -> bytes:
+    """An EgmSensor datagram; axes as for `encode_robot`.
 
     Raises:
         ValueError: A number is not finite, or positions and speeds differ in number: nothing a robot may be sent.
     """
-    q, qd = np.rad2deg(packet.q_ref), np.rad2deg(packet.qd_ref)
-    if not (q.shape == qd.shape and q.ndim == 1 and np.isfinite(q).all() and np.isfinite(qd).all()):
+    q, qd = np.asarray(packet.q_ref), np.asarray(packet.qd_ref)
+    axes = axes_of(q.size) if axes is None else axes
+    fits = q.shape == qd.shape == (axes.n,)
+    if fits:
+        q, qd = q * axes.to_wire, qd * axes.to_wire
+    if not (fits and np.isfinite(q).all() and np.isfinite(qd).all()):
         raise ValueError(f"no reference for a robot: q_ref = {packet.q_ref}, qd_ref = {packet.qd_ref}")
     message = _wire.EgmSensor()
     _set_header(message.header, packet.seq, packet.time_ms, _wire.EgmHeader.CORRECTION)
-    message.planned.joints.joints.extend(q.tolist())
-    message.speedRef.joints.joints.extend(qd.tolist())
+    axes.write(message.planned, q)
+    axes.write(message.speedRef, qd)
     return message.SerializeToString()
 
 
-def decode_sensor(data: bytes, n: int) -> SensorPacket:
-    """Read an EgmSensor datagram for a robot with n joints; a missing speedRef counts as zero speed.
+def decode_sensor(data: bytes, n: int | Axes) -> SensorPacket:
+    """Read an EgmSensor datagram for a robot with n joints, or with these axes; no speedRef counts as zero speed.
 
     Raises:
         MalformedPacket: It is none, or its joint values cannot be used.
     """
     message = _parse(_wire.EgmSensor(), data)
     _check_header(message, _wire.EgmHeader.CORRECTION)
-    speeds = message.speedRef.joints.joints
+    axes, speeds = axes_of(n) if isinstance(n, int) else n, message.speedRef
     return SensorPacket(
         seq=message.header.seqno,
         time_ms=message.header.tm,
-        q_ref=_radians("planned.joints", message.planned.joints.joints, n),
-        qd_ref=_radians("speedRef.joints", speeds, n) if speeds else np.zeros(n),
+        q_ref=_radians("planned", message.planned, axes),
+        qd_ref=_radians("speedRef", speeds, axes) if _given(speeds) else np.zeros(axes.n),
     )
 
 
@@ -194,13 +205,24 @@ def _timed(feedback: Any) -> bool:
     return feedback.time.HasField("sec") and feedback.time.HasField("usec")
 
 
-def _radians(name: str, degrees: Any, n: int) -> NDArray[np.float64]:
-    if len(degrees) != n:
-        raise MalformedPacket(WRONG_JOINT_COUNT, f"{name}: {len(degrees)} numbers, expected {n}")
-    q = np.array(degrees, dtype=np.float64)
+def _given(message: Any) -> bool:
+    """Whether there are any joint values."""
+    return bool(message.joints.joints or message.externalJoints.joints)
+
+
+def _radians(name: str, message: Any, axes: Axes) -> NDArray[np.float64]:
+    """Joint values (n,) [rad] of a message with both lists, in the robot's order."""
+    inner, outer = message.joints.joints, message.externalJoints.joints
+    for part, found, places in (("joints", inner, axes.inner), ("externalJoints", outer, axes.outer)):
+        if len(found) != len(places):
+            raise MalformedPacket(WRONG_JOINT_COUNT, f"{name}.{part}: {len(found)} numbers, expected {len(places)}")
+    q = np.array(inner, dtype=np.float64)
+    if len(outer):
+        q, first = np.empty(axes.n), q
+        q[axes.inner], q[axes.outer] = first, outer
     if not np.isfinite(q).all():
         raise MalformedPacket(NOT_FINITE, f"{name}: {q}")
-    return np.deg2rad(q)
+    return q * axes.from_wire
 
 
 def newer(seq: int, than: int) -> bool:

@@ -163,9 +163,7 @@ def run_stream(
                 run.worst_tick = max(run.worst_tick, loop.tick.solve_time)
             if on_tick is not None:
                 on_tick(loop.tick)
-    except (
-        BaseException
-    ) as error:  # the loop itself: nothing it would send can be trusted but a ramp out of the session
+    except BaseException as error:  # the loop itself: what it would send cannot be trusted, the session can brake
         run.failure = f"{type(error).__name__}: {error}"
         leave(f"loop failed: {run.failure}")
         _last_resort(streamer, loop, watchdog)

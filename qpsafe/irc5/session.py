@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.axes import Axes, axes_of
 from qpsafe.irc5.cycle import Cycle, Phase
 from qpsafe.irc5.inbox import Arrival, Inbox, Sender
 from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
@@ -32,6 +33,7 @@ class EgmSession:
         rules: How to ramp, and what counts as wrong.
         peer: Address of the robot; by default that of the first valid packet.
         joint_names: For the reports.
+        axes: Which joints are external; by default those from the seventh on.
 
     Attributes:
         phase: Now.
@@ -41,7 +43,7 @@ class EgmSession:
         q, qd: The reference last answered (n,) [rad, rad/s].
 
     Raises:
-        ConfigurationError: Limits are no JointLimits, or the names are not one a joint.
+        ConfigurationError: Limits are no JointLimits, or names or axes are not those of as many joints.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class EgmSession:
         rules: SessionRules | None = None,
         peer: str | None = None,
         joint_names: Sequence[str] | None = None,
+        axes: Axes | None = None,
     ) -> None:
         if not isinstance(limits, JointLimits):
             raise ConfigurationError("EgmSession", "limits", limits, "a JointLimits")
@@ -59,7 +62,10 @@ class EgmSession:
         self.names = tuple(joint_names or (f"joint_{i + 1}" for i in range(self.n)))
         if len(self.names) != self.n:
             raise ConfigurationError("EgmSession", "joint_names", joint_names, f"{self.n} names")
-        self.inbox = Inbox(limits.lower, limits.upper, self.rules, peer)
+        self.axes = axes_of(self.n) if axes is None else axes
+        if self.axes.n != self.n:
+            raise ConfigurationError("EgmSession", "axes", self.axes.n, f"axes of {self.n} joints")
+        self.inbox = Inbox(limits.lower, limits.upper, self.rules, peer, self.axes)
         self.counts: Counter[str] = self.inbox.counts
         self.phase = Phase.WAITING
         self.causes: tuple[str, ...] = ()
@@ -184,7 +190,7 @@ class EgmSession:
             self._shaper.settle(self._rest)
         self._remember(self.q)
         self._ticks += 1
-        data = encode_sensor(SensorPacket(self._seq, int(self._now * 1e3), self.q, self.qd))
+        data = encode_sensor(SensorPacket(self._seq, int(self._now * 1e3), self.q, self.qd), self.axes)
         self._seq += 1
         self.counts["answered"] += 1
         return data

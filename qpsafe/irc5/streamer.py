@@ -13,6 +13,7 @@ from typing import Self
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.arrival import ask_for_times, receive
+from qpsafe.irc5.axes import Axes
 from qpsafe.irc5.messages import DEFAULT_PORT, MAX_SIZE
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
@@ -44,6 +45,7 @@ class EgmStreamer:
         rules: How to ramp, and what counts as wrong.
         peer: Address of the robot; by default that of the first valid packet.
         joint_names: For the reports.
+        axes: Which joints are external; by default those from the seventh on.
 
     Attributes:
         session: What decides; its phase, causes and counts.
@@ -64,8 +66,9 @@ class EgmStreamer:
         rules: SessionRules | None = None,
         peer: str | None = None,
         joint_names: Sequence[str] | None = None,
+        axes: Axes | None = None,
     ) -> None:
-        self.session = EgmSession(limits, rules, peer, joint_names)
+        self.session = EgmSession(limits, rules, peer, joint_names, axes)
         if not (isinstance(port, int) and 0 <= port < 65536):
             raise ConfigurationError("EgmStreamer", "port", port, "a UDP port, 0 to 65535")
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from qpsafe.irc5.axes import axes_of_robot
 from qpsafe.irc5.messages import RobotPacket, decode_robot, encode_robot
 from qpsafe.irc5.session import EgmSession
 from qpsafe.limits import JointLimits
@@ -22,11 +23,12 @@ def session_limits(controller: SafetyController) -> JointLimits:
 
 def warm_up(controller: SafetyController, blind: bool, ticks: int = 300) -> None:
     """Run controller and session on a pretended robot through all regimes, then make the controller as new."""
-    session = EgmSession(session_limits(controller), joint_names=controller.robot.joint_names)
+    axes = axes_of_robot(controller.robot)
+    session = EgmSession(session_limits(controller), joint_names=controller.robot.joint_names, axes=axes)
     q, count = controller.robot.home, 0 if controller.spots is None else len(controller.spots)
     for k in range(ticks):
-        data = encode_robot(RobotPacket(k, 4 * k, q, q, clock=1.0 + 0.004 * k))
-        decode_robot(data, len(q))
+        data = encode_robot(RobotPacket(k, 4 * k, q, q, clock=1.0 + 0.004 * k), axes)
+        decode_robot(data, axes)
         session.offer(data, ("127.0.0.1", 1), 0.004 * k)
         cycle = session.take()
         if cycle is None:

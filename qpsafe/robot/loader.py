@@ -193,6 +193,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         regions=regions,
         held=model_file.held,
         hulls=model_file.hulls,
+        external_joints=None if file.egm is None else tuple(file.egm.external),
     )
 
 

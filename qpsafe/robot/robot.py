@@ -74,6 +74,7 @@ class Robot(Fixed):
         self.model_path: Path = spec.model_path
         self.spots_path: Path | None = spec.spots_path
         self.regions: tuple[Region, ...] = spec.regions
+        self.external_joints: tuple[str, ...] | None = spec.external_joints
         self.model = model
         self.nq: int = model.nq
         self.joint_names = spec.joint_names

@@ -123,6 +123,12 @@ class RegionTable(_Table):
     self_sight: Annotated[float, pydantic.Field(strict=True, ge=0.0, le=1.0)] = 0.02
 
 
+class EgmTable(_Table):
+    """Of the wire to an ABB controller: joints that it takes for external ones, in its order, e.g. a seventh axis."""
+
+    external: list[Name]
+
+
 class RobotFile(_Table):
     """A whole `robot.toml`, in the units of the file."""
 
@@ -141,6 +147,7 @@ class RobotFile(_Table):
     tool: tuple[ToolTable, ...] = ()
     danger: DangerTable | None = None
     regions: list[RegionTable] = []
+    egm: EgmTable | None = None
 
     @pydantic.field_validator("tool", "denavit_hartenberg", mode="before")
     @classmethod
@@ -218,6 +225,9 @@ def check(path: Path, file: RobotFile) -> None:
     if danger is not None and danger.delta_f * (1.0 + danger.epsilon_f) > danger.delta * (1.0 - danger.epsilon):
         expected = "delta_f (1 + epsilon_f) <= delta (1 - epsilon), or two levels of Table I overlap"
         raise RobotFileError(path, "danger.delta_f", danger.delta_f, expected)
+    for name in () if file.egm is None else file.egm.external:
+        if name not in file.joints:
+            raise RobotFileError(path, "egm.external", name, "one of the joints: " + ", ".join(file.joints))
     for i, region in enumerate(file.regions):
         _check_region(path, f"regions[{i}]", region, file)
     names = [region.name for region in file.regions]

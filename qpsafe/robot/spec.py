@@ -96,6 +96,7 @@ class RobotSpec:
         regions: Parts of the surface that may carry distance sensors.
         held: Joints of the model file that are held, and where.
         hulls: Reads the hulls of its collision geometry.
+        external_joints: Joints that an ABB controller takes for external ones, in its order; None for the usual ones.
     """
 
     name: str
@@ -119,3 +120,4 @@ class RobotSpec:
     regions: tuple[Region, ...] = ()
     held: Mapping[str, HeldJoint] = field(default_factory=dict)
     hulls: Callable[[], list[BodyHull]] = list
+    external_joints: tuple[str, ...] | None = None

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import os
+import signal
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
+from qpsafe.errors import QpsafeError
 from qpsafe.irc5.session import EgmSession
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5_bench import Workbench
@@ -60,6 +64,17 @@ def test_the_matrix_sees_a_broken_streamer(monkeypatch: pytest.MonkeyPatch) -> N
     (result,) = run_faults(load_robot("irb140"), 1, seed=3, latest=300, cases=jump)
     assert not result.kept
     assert "on fire" in result.errors[0]
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes that inherit the work")
+def test_a_worker_that_dies_is_told_and_the_moments_agree_with_those_of_one_process() -> None:
+    (case,) = (case for case in CASES if case.name == "Ctrl-C")
+    robot = load_robot("irb140")
+    alone, beside = (run_faults(robot, 2, seed=3, latest=210, cases=[case], jobs=jobs) for jobs in (1, 2))
+    assert alone == beside
+    dies = case._replace(start=lambda bench: os.kill(os.getpid(), signal.SIGKILL))
+    with pytest.raises(QpsafeError, match="worker process died"):
+        run_faults(robot, 2, seed=3, latest=210, cases=[dies], jobs=2)
 
 
 @pytest.mark.slow

@@ -59,6 +59,18 @@ def test_over_the_wire_as_in_one_process(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_fourteen_joints_go_over_the_wire_as_six_and_eight_external_ones() -> None:
+    """The IRB 14000, both arms, evading: equal to the last bit to the same in one process."""
+    robot, settings = load_robot("irb14000"), EgmSettings()
+    wire, seen, report = over_the_wire("fixed", robot, 6.5, settings, "--robot", "irb14000", lockstep=True)
+    assert wire.q.shape[1] == 14
+    assert (np.ptp(wire.q, axis=0) > 1e-3).all()
+    assert agreement(wire.q, in_one_process("fixed", robot, 6.5, settings).q).largest == 0.0
+    assert (seen.counts["answered"], seen.counts["missed"], seen.rejected) == (len(wire.q), 0, 0)
+    assert report["good"] is True
+
+
+@pytest.mark.slow
 def test_the_third_experiment_grips_over_the_wire() -> None:
     """Pick and place with two processes: a screw is gripped when the program's event arrives, and held."""
     robot, settings = load_robot("irb140"), EgmSettings()
