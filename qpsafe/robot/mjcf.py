@@ -6,6 +6,7 @@ MuJoCo resolves includes, default classes, frames, references, angles and plugin
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
@@ -13,7 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from qpsafe.errors import RobotFileError
-from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint
+from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint, HeldJoint
 
 #: Range of a joint that turns without end, either way: so far that it is never met, and a finite number [rad].
 ENDLESS = 2000.0 * np.pi
@@ -121,6 +122,21 @@ def compile_mjcf(path: Path, root: Element) -> Compiled:
             )
         )
     return Compiled(model, bodies, body_names, tuple(joints), ids, tuple(notes), stand)
+
+
+def held_positions(model: Any, held: Mapping[str, HeldJoint], prefix: str = "") -> tuple[list[int], list[float]]:
+    """Where the positions of held joints are in `qpos` of a MuJoCo model, and what they are.
+
+    Args:
+        model: A model that the robot is in.
+        held: `Robot.held`.
+        prefix: What stands before the robot's names there.
+    """
+    import mujoco
+
+    ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + name) for name in held}
+    found = [(int(model.jnt_qposadr[j]), held[name].value) for name, j in ids.items() if j >= 0]
+    return [address for address, _ in found], [value for _, value in found]
 
 
 def _robot_bodies(model: Any) -> tuple[tuple[int, ...], list[int]]:
