@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
 import numpy as np
 
 from qpsafe.danger.field import DangerField
+from qpsafe.json_text import json_text
 from qpsafe.robot.wire import Wire
 
 POINTS, LINKS, GOAL_US = 20, 6, 40.0
@@ -59,7 +59,7 @@ def main() -> None:
     print(f"  median {result['median_us']:.1f} µs   p99 {result['p99_us']:.1f} µs   max {result['max_us']:.1f} µs")
     print(f"  goal: median <= {GOAL_US:.0f} µs: {'met' if result['ok'] else 'missed'}")
     if arguments.json:
-        arguments.json.write_text(json.dumps(result, indent=2) + "\n")
+        arguments.json.write_text(json_text(result) + "\n")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from qpsafe.json_text import json_text
 from qpsafe.sim.irc5_compare import stream_process
 from qpsafe.timing import machine
 
@@ -91,7 +92,7 @@ def main() -> None:
             sys.stdout.flush()
     if arguments.json:
         content = {"machine": machine(), "results": results}
-        arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        arguments.json.write_text(json_text(content) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,11 +11,11 @@ an answer in time.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
 from qpsafe.irc5.realtime import fifo
+from qpsafe.json_text import json_text
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5_compare import Course, agreement, in_one_process, over_the_wire
 from qpsafe.sim.irc5_motion import EgmSettings
@@ -66,7 +66,7 @@ def main() -> None:
             "stream": report,
         }
     if arguments.json:
-        arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        arguments.json.write_text(json_text(content) + "\n", encoding="utf-8")
 
 
 def fate(course: Course) -> dict[str, Any]:

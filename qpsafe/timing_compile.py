@@ -14,6 +14,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from qpsafe.json_text import json_text
+
 
 class Start(NamedTuple):
     """A process that makes all kernels ready.
@@ -70,4 +72,4 @@ def _report(names: list[str]) -> None:
         importlib.import_module(name)
     from qpsafe.danger.compiled import seconds
 
-    print(json.dumps((seconds, time.process_time())))
+    print(json_text((seconds, time.process_time()), indent=None))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, progress_bar, write_text
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -88,7 +88,7 @@ def _write(screen: Console, path: Path | None, results: dict[str, Any]) -> None:
     if path is not None:
         from qpsafe.timing import machine
 
-        write_text(path, json_module.dumps({"machine": machine(), "unit": "s", "results": results}, indent=2) + "\n")
+        write_text(path, json_text({"machine": machine(), "unit": "s", "results": results}) + "\n")
         screen.print(f"written to {path}")
 
 

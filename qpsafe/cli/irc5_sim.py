@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import math
 import sys
 from collections import Counter
@@ -15,6 +14,7 @@ import typer
 from qpsafe.cli.common import SensorName, console, print_json, write_text
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -176,5 +176,5 @@ def show(run: RobotRun, screen: Console) -> None:
     if run.counts["answered"] == 0:
         screen.print("nobody answered", style="yellow")
     screen.print(f"{run.cycles} cycles, {run.late} of them more than 4 ms late themselves", highlight=False)
-    screen.print(json_module.dumps(counts | {"rejected": run.rejected}), highlight=False)
+    screen.print(json_text(counts | {"rejected": run.rejected}, indent=None), highlight=False)
     screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s", highlight=False)
