@@ -31,7 +31,7 @@ class RatesTable(Table):
 
 
 class Point(Table):
-    """A place: a position in m with angles in deg, or joint positions in deg."""
+    """A place: a position in m with angles in deg, or joint positions in deg, m where a joint slides."""
 
     position: Vector | None = None
     euler: Vector | None = None

@@ -152,6 +152,18 @@ class Robot:
         """Segments of the wire model and the velocities of their ends, eq. (4), each (links, 3) [m, m/s]."""
         return self.at(q).wire(qd)
 
+    def nearest(self, goal: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
+        """Joint positions that mean the same as `goal` and are nearest to q: whole turns less on endless joints, (n,).
+
+        A `JointMove` to them takes the short way.
+
+        Raises:
+            ConfigurationError: goal or q has the wrong shape.
+        """
+        there, here = self.joint_vector(goal, "goal"), self.joint_vector(q, "q")
+        turns = np.round((there - here) / (2.0 * np.pi))
+        return there - np.where(self.endless, 2.0 * np.pi * turns, 0.0)
+
     def frame_id(self, frame: str) -> int:
         """pinocchio's index of a frame.
 
