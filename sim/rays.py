@@ -115,11 +115,11 @@ def _body(scene: Scene, frame: str) -> int:
     """The MuJoCo body that a frame of the robot, or the joint that moves it, is fixed to; 0 for the world."""
     model, found = scene.model, scene.robot.model.frames[scene.robot.frame_id(frame)]
     name, kind = "robot/" + name_in_file(found.name), mujoco.mjtObj
-    owners = (
+    owners: list[tuple[Any, Any]] = [
         (kind.mjOBJ_SITE, model.site_bodyid),
         (kind.mjOBJ_BODY, np.arange(model.nbody)),
         (kind.mjOBJ_JOINT, model.jnt_bodyid),
-    )
+    ]
     if found.name != name_in_file(found.name):  # a body, or a joint, whose name a site has too
         owners = owners[1:] if "(body" in found.name else owners[2:]
     for what, bodies in owners:

@@ -45,7 +45,7 @@ def hulls_of_mjcf(path: Path, compiled: Compiled, places: dict[int, tuple[int, A
     of_robot = np.flatnonzero(own & solid_geoms(model))
     if not len(of_robot):  # what collides is none of the robot's
         of_robot = np.flatnonzero(own)
-    for geom in of_robot:
+    for geom in map(int, of_robot):
         body = int(model.geom_bodyid[geom])
         name = model.geom(geom).name or f"{compiled.body_names[body]}_{geom - model.body_geomadr[body]}"
         points = corners.of_geom(model, geom)

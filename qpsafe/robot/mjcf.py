@@ -178,26 +178,30 @@ def _equalities(
     """Joints that follow others, joints in closed loops, and the constraints of other kinds."""
     import mujoco
 
-    kinds, couplings, loops, others = mujoco.mjtEq, {}, {}, []
+    kinds = mujoco.mjtEq
+    couplings: dict[int, Coupling] = {}
+    loops: dict[int, int] = {}
+    others: list[int] = []
     for e in range(model.neq):
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         if not model.eq_active0[e]:
             continue
         if int(model.eq_type[e]) == kinds.mjEQ_JOINT:
-            source = second if second >= 0 else first  # alone, it is held where it is
-            own, at = model.qpos0[model.jnt_qposadr[[first, source]]]
-            if second >= 0:
-                couplings[first] = Coupling(names[source], tuple(model.eq_data[e, :5]), own, at)
-            else:
-                couplings[first] = Coupling(names[first], (float(model.eq_data[e, 0]),), own)
+            alone = second < 0  # locked: it "follows" itself by a constant
+            source = first if alone else second
+            if bodies.issuperset(model.jnt_bodyid[[first, source]].tolist()):
+                own, at = model.qpos0[model.jnt_qposadr[[first, source]]].tolist()
+                coefficients = model.eq_data[e, : 1 if alone else 5].tolist()
+                couplings[first] = Coupling(names[source], tuple(coefficients), own, at)
         elif int(model.eq_type[e]) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             ends = [first, second]
             if int(model.eq_objtype[e]) == mujoco.mjtObj.mjOBJ_SITE:
                 ends = [int(model.site_bodyid[site]) for site in ends]
             if all(end == 0 or end in bodies for end in ends):
                 one, other = (_joints_towards_world(model, end) for end in ends)
-                number = min((loops[j] for j in one ^ other if j in loops), default=e)
-                loops.update(dict.fromkeys(one ^ other, number))
+                touched = {loops[j] for j in one ^ other if j in loops}  # loops that share a joint are one
+                members = (one ^ other) | {j for j, number in loops.items() if number in touched}
+                loops.update(dict.fromkeys(members, e))
         else:
             others.append(e)
     return couplings, loops, others

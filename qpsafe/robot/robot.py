@@ -100,8 +100,8 @@ class Robot:
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
         self.memory = self.tree.memory
-        self.sliding = ~self.tree.axes[:, 3:].any(axis=1)
-        self.endless = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
+        self.sliding: NDArray[np.bool_] = ~np.any(self.tree.axes[:, 3:], axis=1)
+        self.endless: NDArray[np.bool_] = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
         frames = {name: model.frames[index] for name, index in self._frame_ids.items()}
         self._mountings = {
             name: (int(frame.parentJoint), _read_only(frame.placement.homogeneous)) for name, frame in frames.items()

@@ -105,6 +105,8 @@ class Writer:
             text = self.link(prefix, i, text)
         if self.has("coupled"):
             self.after += '<joint joint1="j2" joint2="j1" polycoef="0 -1 0 0 0"/>'
+        if self.has("locked"):
+            self.after += '<joint joint1="j2" polycoef="0.2 0 0 0 0"/>'
         if self.has("loop"):
             self.after += '<connect body1="link3" body2="link1" anchor="0 0 0.1"/>'
         if self.has("rail"):

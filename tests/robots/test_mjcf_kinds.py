@@ -47,6 +47,7 @@ LOADED = {
     "two joints in a body": "double anchor ref",
     "gripper of two fingers": "gripper root_pose",
     "gripper of closed loops": "loop_gripper unnamed",
+    "a joint that is locked": "locked ref",
     "one name for everything": "same_names site_same",
     "objects and mocap targets beside it": "object mocap root_pose",
     "on a free base": "free_base",
@@ -82,7 +83,9 @@ def test_an_arm_is_what_mujoco_makes_of_it(kind: str, seed: int, tmp_path: Path,
     ids = joint_ids(model, robot)
     expected = (model.jnt_type >= 2).sum() - len(robot.held)
     assert robot.nq == expected
-    assert all("finger" in name or "crank" in name or "pad" in name or "spring" in name for name in robot.held)
+    assert all(
+        "finger" in name or "crank" in name or "pad" in name or "spring" in name or name == "j2" for name in robot.held
+    )
     limited = model.jnt_limited[ids].astype(bool)
     np.testing.assert_allclose(robot.lower[limited], model.jnt_range[ids][limited, 0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(robot.upper[limited], model.jnt_range[ids][limited, 1], rtol=0, atol=1e-12)
