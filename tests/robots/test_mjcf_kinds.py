@@ -83,9 +83,12 @@ def test_an_arm_is_what_mujoco_makes_of_it(kind: str, seed: int, tmp_path: Path,
     ids = joint_ids(model, robot)
     expected = (model.jnt_type >= 2).sum() - len(robot.held)
     assert robot.nq == expected
-    assert all(
-        "finger" in name or "crank" in name or "pad" in name or "spring" in name or name == "j2" for name in robot.held
-    )
+    held = {"gripper": "finger", "loop_gripper": "crank pad spring", "locked": "j2"}
+    words = [word for feature, words in held.items() if writer.has(feature) for word in words.split()]
+    assert bool(robot.held) == bool(words)
+    assert all(any(word in name for word in words) for name in robot.held)
+    if writer.has("locked"):
+        assert robot.held["j2"].value == pytest.approx(model.qpos0[model.joint("j2").qposadr[0]] + 0.2)
     limited = model.jnt_limited[ids].astype(bool)
     np.testing.assert_allclose(robot.lower[limited], model.jnt_range[ids][limited, 0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(robot.upper[limited], model.jnt_range[ids][limited, 1], rtol=0, atol=1e-12)
@@ -94,6 +97,9 @@ def test_an_arm_is_what_mujoco_makes_of_it(kind: str, seed: int, tmp_path: Path,
         np.testing.assert_allclose(robot.home, [writer.keys[name] for name in robot.joint_names], atol=1e-12)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
     for q in (robot.home, *rng.uniform(np.maximum(robot.lower, -7), np.minimum(robot.upper, 7), (4, robot.nq))):
+        for name, joint in robot.held.items():
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) >= 0:  # else it is at rest
+                data.joint(name).qpos[:] = joint.value
         data.qpos[model.jnt_qposadr[ids]] = q
         mujoco.mj_forward(model, data)
         compare_frames(model, data, robot, q)
