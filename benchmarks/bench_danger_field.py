@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from qpsafe.cli.outputs import try_file
 from qpsafe.danger.field import DangerField
+from qpsafe.json_text import json_text
 from qpsafe.robot.wire import Wire
 
 POINTS, LINKS, GOAL_US = 20, 6, 40.0
@@ -62,7 +62,7 @@ def main() -> None:
     print(f"  median {result['median_us']:.1f} µs   p99 {result['p99_us']:.1f} µs   max {result['max_us']:.1f} µs")
     print(f"  goal: median <= {GOAL_US:.0f} µs: {'met' if result['ok'] else 'missed'}")
     if arguments.out:
-        arguments.out.write_text(json.dumps(result, indent=2) + "\n")
+        arguments.out.write_text(json_text(result) + "\n")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import gc
-import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -27,6 +26,7 @@ from qpsafe.hqp.level import Level
 from qpsafe.hqp.native_daqp import arrange, call_daqp
 from qpsafe.hqp.native_proxqp import solve_proxqp
 from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.json_text import json_text
 
 Solver = Callable[[], np.ndarray | None]
 
@@ -284,7 +284,7 @@ def main() -> None:
     )
     report(f"drifting sequence with active limits, {result['ticks']} ticks [µs]", result["drift"])
     if arguments.out:
-        arguments.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+        arguments.out.write_text(json_text(result) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

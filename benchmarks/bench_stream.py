@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.cli.outputs import try_file
+from qpsafe.json_text import json_text
 from qpsafe.sim.irc5_compare import stream_process
 from qpsafe.timing import machine
 from qpsafe.words import growth
@@ -95,7 +96,7 @@ def main() -> None:
             sys.stdout.flush()
     if arguments.out:
         content = {"machine": machine(), "results": results}
-        arguments.out.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        arguments.out.write_text(json_text(content) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,12 +11,12 @@ an answer in time.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
 from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.realtime import fifo
+from qpsafe.json_text import json_text
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5_compare import Course, agreement, in_one_process, over_the_wire
 from qpsafe.sim.irc5_motion import EgmSettings
@@ -69,7 +69,7 @@ def main() -> None:
             "stream": report,
         }
     if arguments.out:
-        arguments.out.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        arguments.out.write_text(json_text(content) + "\n", encoding="utf-8")
 
 
 def fate(course: Course) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import importlib.util
-import json
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,7 @@ from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.inbox import REFUSALS
 from qpsafe.irc5.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
 from qpsafe.irc5.session import EgmSession
+from qpsafe.json_text import json_text
 from qpsafe.limits import JointLimits
 
 N, DT = 6, 0.004
@@ -276,7 +276,7 @@ def main() -> None:
         else "some datagrams were not accounted for"
     )
     if arguments.out:
-        arguments.out.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+        arguments.out.write_text(json_text(report) + "\n", encoding="utf-8")
     sys.exit(0 if report["ok"] else 1)
 
 

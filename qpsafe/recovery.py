@@ -200,7 +200,7 @@ class Recovery:
         value = task.value(state)
         if not sample.finite:  # never into an offset, which remembers
             raise ValueError(f"the trajectory of the {task.name} task is not finite")
-        offset, before, joints = sample.offset(value), self._offset_before(k), value.ndim == 1
+        offset, before, joints = task.offset(value, sample), self._offset_before(k), value.ndim == 1
         back, self._offsets[k] = self._returns[k], offset
         if back is not None and active >= 1.0:
             back = back.later(self.dt)
@@ -220,7 +220,8 @@ class Recovery:
         """Offset of task k at the last tick, None if it was not finite or there was none."""
         if self._last[k] is not None:
             (state, sample), self._last[k] = self._last[k], None
-            self._offsets[k] = sample.offset(self.tasks[k].value(state)) if sample.finite else None
+            task = self.tasks[k]
+            self._offsets[k] = task.offset(task.value(state), sample) if sample.finite else None
         return self._offsets[k]
 
     def _not_back(self, activations: tuple[float, ...]) -> tuple[str, ...]:

@@ -14,6 +14,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from qpsafe.json_text import json_text
+
 #: In a source tree the last three lie beside `qpsafe`, where walking through its folder does not lead.
 PACKAGES = ("qpsafe", "qpsafe.tasks", "qpsafe.robots", "qpsafe.sim")
 
@@ -72,4 +74,4 @@ def _report(names: list[str]) -> None:
         importlib.import_module(name)
     from qpsafe.danger.compiled import seconds
 
-    print(json.dumps((seconds, time.process_time())))
+    print(json_text((seconds, time.process_time()), indent=None))

@@ -15,6 +15,7 @@ from qpsafe.sim.caption import Caption
 from qpsafe.sim.overlay import DangerOverlay
 from qpsafe.sim.plant import Plant
 from qpsafe.sim.render import VideoWriter
+from qpsafe.sim.robot_spec import shown_groups
 from qpsafe.sim.scene import Scene
 from qpsafe.tick import Tick
 
@@ -135,6 +136,7 @@ class Viewer:
                 if not glfw.init():  # MuJoCo would end the whole process
                     raise RuntimeError("no display")
             self._handle = mujoco.viewer.launch_passive(plant.scene.model, plant.data)
+            self._handle.opt.geomgroup[:] = shown_groups(plant.scene.model)
         except Exception as error:
             raise ViewerUnavailableError(f"MuJoCo's viewer cannot open a window here: {error}") from error
         self._start = time.perf_counter()

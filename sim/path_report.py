@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.json_text import plain
 from qpsafe.recovery import FOLLOWING
 from qpsafe.sim.path import PathRun
 from qpsafe.sim.report import Check, split
@@ -147,16 +147,11 @@ def promises(
 def to_dict(found: Mapping[str, PathFigures], checks: list[Check], left_out: Sequence[str]) -> dict[str, Any]:
     """For JSON."""
     return {
-        "laws": {name: {key: _or_none(value) for key, value in asdict(item).items()} for name, item in found.items()},
+        "laws": {name: plain(asdict(item)) for name, item in found.items()},
         "checks": [check._asdict() for check in checks],
         "left_out": list(left_out),
         "kept": all(check.kept for check in checks),
     }
-
-
-def _or_none(value: float | None) -> float | None:
-    """JSON has no NaN."""
-    return None if value is None or math.isnan(value) else value
 
 
 def _largest(values: NDArray[np.float64], where: Flags) -> float | None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.json_text import plain
 from qpsafe.sim.pick_place import PickRun
 from qpsafe.sim.report import Check
 from qpsafe.words import counted
@@ -131,15 +132,10 @@ def to_dict(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Ch
     """For JSON."""
     costs = [cost(item, alone) for item in runs]
     return {
-        "runs": [_plain(asdict(item)) | {"cost_per_cycle": c} for item, c in zip(runs, costs, strict=True)],
-        "without_people": _plain(asdict(alone)),
+        "runs": [plain(asdict(item)) | {"cost_per_cycle": c} for item, c in zip(runs, costs, strict=True)],
+        "without_people": plain(asdict(alone)),
         "cost_per_cycle": spread(costs),
         "duration": spread([item.duration for item in runs]),
         "checks": [check._asdict() for check in checks],
         "kept": all(check.kept for check in checks),
     }
-
-
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    """JSON has no infinity."""
-    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in values.items()}

@@ -9,7 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.robot.mjcf import held_positions
 from qpsafe.sim.gl import make_context
+from qpsafe.sim.robot_spec import robot_spec, shown_groups
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -43,6 +45,8 @@ def picture(
     width, height = SCALE * SIZE[0], SCALE * SIZE[1]
     model = _model(robot, shown, q, chosen is not None, width, height)
     data = mujoco.MjData(model)
+    addresses, values = held_positions(model, robot.held, "robot/")
+    data.qpos[addresses] = values
     for name, value in zip(robot.joint_names, q, strict=True):
         data.qpos[model.joint(f"robot/{name}").qposadr] = value
     mujoco.mj_forward(model, data)
@@ -81,7 +85,7 @@ def _view(
     camera.azimuth, camera.elevation, camera.distance = azimuth, -16.0, distance
     camera.lookat[:] = centre
     options = mujoco.MjvOption()
-    options.geomgroup[:] = [1, 1, 1, not (model.geom_group == 2).any(), 0, 0]
+    options.geomgroup[:] = shown_groups(model)
     options.sitegroup[:] = 0
     drawing = mujoco.MjvScene(model, maxgeom=3000)
     everything = mujoco.mjtCatBit.mjCAT_ALL
@@ -115,7 +119,7 @@ def _model(robot: Robot, shown: SpotArray, q: NDArray, with_directions: bool, wi
         <geom type="plane" size="20 20 0.1" material="floor"/>
       </worldbody>
     </mujoco>""")
-    spec.attach(mujoco.MjSpec.from_file(str(robot.model_path)), frame=spec.worldbody.add_frame(), prefix="robot/")
+    spec.attach(robot_spec(robot), frame=spec.worldbody.add_frame(), prefix="robot/")
     origins, directions = shown.rays(robot.at(q))
     looks: dict[str, Any] = {"contype": 0, "conaffinity": 0, "group": 1, "rgba": SPOT if with_directions else NODE}
     sphere, capsule = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
+from qpsafe.robot.mjcf import held_positions
 from qpsafe.sim.anatomy import SEGMENTS
 from qpsafe.sim.limbs import axis_quaternions
+from qpsafe.sim.robot_spec import ROBOT_COLLISION, robot_spec
 from qpsafe.sim.surroundings import SCENERY, add_surroundings
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DUMMY, ROBOT_SKIN = 1, 3  # geometry groups; SCENERY is 0
+DUMMY = 1  # geometry group
 _FREE = 7  # numbers of a free body's pose
 _DUMMY_BIT, _GROUND_BIT = 1 << 20, 1 << 21  # contact bits that no robot's model is likely to use
 
@@ -59,8 +61,10 @@ class PlacementWorld:
             size = [segment.radius, segment.length / 2, 0.0]
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=size, group=DUMMY, contype=_DUMMY_BIT, conaffinity=0)
         try:
-            own = mujoco.MjSpec.from_file(str(robot.model_path))
-            _add_contacts(own)
+            own = robot_spec(robot)
+            for geom in own.geoms:  # what collides of the robot touches the dummy and the ground
+                if geom.group == ROBOT_COLLISION:
+                    geom.conaffinity = int(geom.conaffinity) | _DUMMY_BIT | _GROUND_BIT
             spec.attach(own, prefix="robot/", frame=spec.worldbody.add_frame())
             model = spec.compile()
         except ValueError as error:
@@ -68,6 +72,8 @@ class PlacementWorld:
             raise RobotFileError(robot.model_path, "model", robot.model_path.name, expected) from None
         self.model: Any = model
         self.data: Any = mujoco.MjData(model)
+        self._held = held_positions(model, robot.held, "robot/")
+        self.data.qpos[self._held[0]] = self._held[1]
         body_names = [model.body(i).name for i in range(model.nbody)]
         self._dummy = np.array([body_names[b].startswith("dummy/") for b in model.geom_bodyid])
         joints = [model.joint(f"robot/{name}") for name in robot.joint_names]
@@ -133,28 +139,17 @@ class PlacementWorld:
         """
         k = len(q)
         qpos = batch.bind("qpos")
+        qpos[:k, self._held[0]] = self._held[1]
         qpos[:k, self._q] = q
         qpos[:k, self._poses] = capsule_poses(capsules.reshape(-1, 2, 3)).reshape(k, len(SEGMENTS), _FREE)
         seen = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
-        seen[[SCENERY, DUMMY, ROBOT_SKIN]] = 1
+        seen[[SCENERY, DUMMY, ROBOT_COLLISION]] = 1
         ids = np.arange(k)
         distance, geom = batch.ray(origins, directions, geomgroup=seen, bodyexclude=own, ids=ids)
         hit = distance >= 0.0
         dummy = hit & self._dummy[geom]
-        robot = hit & (self.model.geom_group[geom] == ROBOT_SKIN)
+        robot = hit & (self.model.geom_group[geom] == ROBOT_COLLISION)
         return np.where(hit, distance, np.inf), dummy, robot
-
-
-def _add_contacts(own: Any) -> None:
-    """Let what collides of the robot touch the dummy and the ground, and put it into the group that rays see."""
-    geoms = list(own.geoms)
-    collides = [bool(geom.contype or geom.conaffinity) for geom in geoms]
-    if not any(collides):  # a model that is only to be looked at: all of it counts
-        collides = [True] * len(geoms)
-    for geom, does in zip(geoms, collides, strict=True):
-        geom.group = ROBOT_SKIN if does else 2
-        if does:
-            geom.conaffinity = int(geom.conaffinity) | _DUMMY_BIT | _GROUND_BIT
 
 
 def capsule_poses(capsules: Array) -> Array:

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.robot.names import name_in_file
 from qpsafe.sensing.spots import rays_in_world
 from qpsafe.sim.scene import PERSON, ROBOT_COLLISION, SCENERY, Scene
 
@@ -116,10 +117,18 @@ class SpotRays:
 
 
 def _body(scene: Scene, frame: str) -> int:
-    """The MuJoCo body that a frame of the robot is fixed to."""
-    model, robot = scene.model, scene.robot
-    target = "robot/" + robot.model.frames[robot.frame_id(frame)].name
-    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, target)
-    return (
-        int(model.site_bodyid[site]) if site >= 0 else int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, target))
-    )
+    """The MuJoCo body that a frame of the robot, or the joint that moves it, is fixed to; 0 for the world."""
+    model, found = scene.model, scene.robot.model.frames[scene.robot.frame_id(frame)]
+    name, kind = "robot/" + name_in_file(found.name), mujoco.mjtObj
+    owners: list[tuple[Any, Any]] = [
+        (kind.mjOBJ_SITE, model.site_bodyid),
+        (kind.mjOBJ_BODY, np.arange(model.nbody)),
+        (kind.mjOBJ_JOINT, model.jnt_bodyid),
+    ]
+    if found.name != name_in_file(found.name):  # a body, or a joint, whose name a site has too
+        owners = owners[1:] if "(body" in found.name else owners[2:]
+    for what, bodies in owners:
+        index = mujoco.mj_name2id(model, what, name)
+        if index >= 0:
+            return int(bodies[index])
+    return 0

@@ -15,6 +15,7 @@ from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.caption import Caption, CaptionStrip
 from qpsafe.sim.gl import gl_available, make_context
 from qpsafe.sim.overlay import DangerOverlay
+from qpsafe.sim.robot_spec import shown_groups
 from qpsafe.sim.scene import CAMERA, Scene
 
 __all__ = ["Camera", "VideoWriter", "gl_available"]
@@ -51,6 +52,7 @@ class Camera:
         self._drawing.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False  # a software renderer spends its time on them
         self._drawing.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._options = mujoco.MjvOption()
+        self._options.geomgroup[:] = shown_groups(scene.model)
         self._view = mujoco.MjvCamera()
         self._view.type, self._view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
 

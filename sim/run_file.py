@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
+from qpsafe.json_text import json_text
 from qpsafe.sim.log import RunLog
 from qpsafe.sim.plant import Plant
 from qpsafe.sim.scene import Scene
@@ -137,7 +138,7 @@ def write_run(
     header["digest"] = _digest(header, arrays)
     part = path.with_name(f".{path.stem}.{os.getpid()}.part{SUFFIX}")
     try:
-        np.savez_compressed(part, header=np.array(json.dumps(header)), **arrays)
+        np.savez_compressed(part, header=np.array(json_text(header, indent=None)), **arrays)
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
@@ -176,7 +177,7 @@ def read_run(path: str | Path) -> RunFile:
 
 def _digest(header: dict[str, Any], arrays: dict[str, NDArray]) -> str:
     """SHA-256 of everything but itself: no bit can change unseen."""
-    digest = hashlib.sha256(json.dumps({**header, "digest": ""}, sort_keys=True).encode())
+    digest = hashlib.sha256(json_text({**header, "digest": ""}, indent=None, sort_keys=True).encode())
     for name in sorted(arrays):
         digest.update(f"{name} {arrays[name].dtype.str} {arrays[name].shape}".encode())
         digest.update(np.ascontiguousarray(arrays[name]).tobytes())

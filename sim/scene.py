@@ -2,8 +2,8 @@
 
 The robot's own file holds the robot only; it is attached here. People and boards are mocap bodies, one per segment:
 they are put where the choreography or the story says and push nothing. Geometry groups: 0 floor and pedestal, 1 people
-and boards (what the distance sensors see), 2 and 3 the robot as seen and as it collides. Names of the robot's file have
-the prefix "robot/".
+and boards (what the distance sensors see), 2 and 3 the robot as seen and as it collides, whatever its file says of
+groups. Names of the robot's file have the prefix "robot/".
 
 World frame = robot base frame; the floor lies a pedestal's height below it.
 """
@@ -20,8 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.robot.mjcf import held_positions
 from qpsafe.sim.anatomy import CARDBOARD
 from qpsafe.sim.person import Board, Person, PersonPose
+from qpsafe.sim.robot_spec import ROBOT_COLLISION, ROBOT_VISUAL, robot_spec
 from qpsafe.sim.surroundings import CAMERA, SCENERY, add_surroundings
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CAMERA", "PERSON", "ROBOT_COLLISION", "ROBOT_VISUAL", "SCENERY", "Scene", "build_scene"]
 
-PERSON, ROBOT_VISUAL, ROBOT_COLLISION = 1, 2, 3  # geometry groups
+PERSON = 1  # geometry group
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class Scene:
     def make_data(self, q: NDArray[np.float64] | None = None) -> Any:
         """Fresh MjData: the robot at rest at q (default its home), the person far away, kinematics computed."""
         data = mujoco.MjData(self.model)
+        addresses, values = held_positions(self.model, self.robot.held, "robot/")
+        data.qpos[addresses] = values
         data.qpos[self.q_addresses] = self.robot.home if q is None else q
         mujoco.mj_forward(self.model, data)
         return data
@@ -139,7 +143,7 @@ def build_scene(
     _set_options(spec, timestep, contacts)
     add_surroundings(spec, pedestal)
     names = [_add_person(spec, person, k) for k, person in enumerate(everybody)]
-    spec.attach(mujoco.MjSpec.from_file(str(robot.model_path)), prefix="robot/", frame=spec.worldbody.add_frame())
+    spec.attach(robot_spec(robot), prefix="robot/", frame=spec.worldbody.add_frame())
     if furnish is not None:
         furnish(spec)
     model = spec.compile()

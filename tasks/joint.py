@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
 
+TURN = 2.0 * np.pi  # [rad]
+
 
 class JointTask(Task):
-    """Keep joints on a trajectory: e = q_d - q [rad].
+    """Keep joints on a trajectory: e = q_d - q [rad], by the short way where a joint turns without end.
 
     Args:
         trajectory: Of all n joints; its samples are `JointSample`s.
@@ -39,15 +41,25 @@ class JointTask(Task):
         if not good:
             raise ConfigurationError(type(self).__name__, "joints", joints, "different numbers from 0, or None")
         self.joints = None if joints is None else tuple(int(joint) for joint in joints)
+        self._endless: NDArray[np.bool_] | None = None  # of the robot whose value was last asked for
 
     def value(self, state: RobotState) -> NDArray[np.float64]:
         """All joint positions (n,) [rad]."""
+        robot = getattr(state, "robot", None)  # what stands in for a state may have no more than q
+        self._endless = robot.endless if robot is not None and robot.endless.any() else None
         return state.q
 
     def error(self, value: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
         """q_d - q of the chosen joints [rad]."""
-        error = sample.position - value
+        error = -self.offset(value, sample)
         return error if self.joints is None else error[list(self.joints)]
+
+    def offset(self, value: NDArray[np.float64], sample: JointSample) -> NDArray[np.float64]:
+        """q - q_d of all joints, less whole turns where a joint turns without end [rad]."""
+        offset = sample.offset(value)
+        if self._endless is None:
+            return offset
+        return offset - np.where(self._endless, TURN * np.round(offset / TURN), 0.0)
 
     def jacobian(self, state: RobotState) -> NDArray[np.float64]:
         """Rows of the identity."""

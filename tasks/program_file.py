@@ -84,10 +84,12 @@ class _Builder:
             if (point.joints is None) == (point.position is None) or (point.joints and point.euler):
                 raise self.wrong(["points", name], point.model_dump(exclude_none=True), "either position or joints")
             if point.joints is not None:
-                q = np.deg2rad(point.joints)
+                q = self.si(point.joints)
                 good = q.shape == (robot.nq,) and (q >= robot.lower).all() and (q <= robot.upper).all()
                 if not good:
-                    raise self.wrong(["points", name, "joints"], point.joints, f"{robot.nq} angles inside the limits")
+                    raise self.wrong(
+                        ["points", name, "joints"], point.joints, f"{robot.nq} positions inside the limits"
+                    )
         self.round = 0  # of the segments, counted through what varies
         for name, choices in file.vary.items():
             if name in file.points:
@@ -133,7 +135,7 @@ class _Builder:
         move: Line
         try:
             if isinstance(segment, JointSegment):
-                goal = self.joints(key, segment.to)
+                goal = robot.nearest(self.joints(key, segment.to), self.q)
                 share = self.file.rates.joints
                 speed, acceleration = share * robot.max_velocity, share * robot.max_acceleration
                 joints = JointMove(self.q, goal, speed, acceleration, acceleration / 0.1)
@@ -194,7 +196,7 @@ class _Builder:
     def pose_of(self, keys: list, name: str) -> Array:
         point = self.point(keys, name)
         if point.joints is not None:
-            return self.robot.pose(self.frame, np.deg2rad(point.joints)).copy()
+            return self.robot.pose(self.frame, self.si(point.joints)).copy()
         pose = self.first.copy()
         pose[:3, 3] = point.position
         if point.euler is not None:
@@ -202,11 +204,17 @@ class _Builder:
             pose[:3, :3] = z @ y @ x
         return pose
 
+    def si(self, joints: list[float]) -> Array:
+        """Joint positions of the file, deg, or m where a joint slides, in SI units."""
+        figures = np.array(joints)
+        slides = self.robot.sliding if figures.shape == (self.robot.nq,) else False
+        return np.where(slides, figures, np.deg2rad(figures))
+
     def joints(self, keys: list, name: str) -> Array:
         """Joint positions of a point (n,), the nearest that can be found."""
         point = self.point(keys, name)
         if point.joints is not None:
-            return np.deg2rad(point.joints)
+            return self.si(point.joints)
         goal = self.target(keys, name)
         problem: UnreachableError | None = None
         for guess in (self.q, self.robot.home):

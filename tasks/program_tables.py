@@ -35,7 +35,7 @@ class RatesTable(Table):
 
 
 class Point(Table):
-    """A place: a position in m with angles in deg, or joint positions in deg."""
+    """A place: a position in m with angles in deg, or joint positions in deg, m where a joint slides."""
 
     position: Place | None = None
     euler: Angles | None = None

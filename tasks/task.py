@@ -67,6 +67,10 @@ class Task(Fixed, ABC):
     def error(self, value: NDArray[np.float64], sample: Any) -> NDArray[np.float64]:
         """Error e (rows,) of a value against a sample of the trajectory; zero when the task is met."""
 
+    def offset(self, value: NDArray[np.float64], sample: Any) -> NDArray[np.float64]:
+        """How far a value is from a sample of the trajectory: what `sample.displaced` would have to move it by."""
+        return sample.offset(value)
+
     @abstractmethod
     def jacobian(self, state: RobotState) -> NDArray[np.float64]:
         """Task Jacobian J (rows, n)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +10,7 @@ import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_file
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -94,7 +94,7 @@ def _write(screen: Console, out: Path | None, json: bool, results: dict[str, Any
 
     content = {"machine": machine(), "unit": "s", "results": results}
     if out is not None:
-        write_text(out, json_module.dumps(content, indent=2) + "\n")
+        write_text(out, json_text(content) + "\n")
         screen.print(f"written to {out}")
     if json:
         print_json(content)

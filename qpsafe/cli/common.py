@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperGroup
+
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -143,8 +144,7 @@ def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], sc
 
 def print_json(value: Any) -> None:
     """Write a value to standard output as JSON."""
-    json.dump(value, sys.stdout, indent=2, default=str)
-    sys.stdout.write("\n")
+    sys.stdout.write(json_text(value) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:

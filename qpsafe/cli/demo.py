@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -27,6 +26,7 @@ from qpsafe.cli.demo_path import path
 from qpsafe.cli.demo_pick import pick_and_place
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -213,7 +213,7 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
         distance_figure(log, without, out / "distance.png")
     else:
         encounter_figure(log, out / "distance.png")
-    write_text(out / "report.json", json_module.dumps(report.to_dict(), indent=2) + "\n")
+    write_text(out / "report.json", json_text(report.to_dict()) + "\n")
     return report
 
 

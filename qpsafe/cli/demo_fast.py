@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ import typer
 
 from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, verdict, write_text
 from qpsafe.cli.outputs import output_folder
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -70,7 +70,7 @@ def fast_person(
             file = out / f"run-{run.experiment}-{run.speed:g}.npz"
             write_run(file, run.log, settings_of(run.built), robot, states)
     rows = [run.to_dict() for run in found]
-    write_text(out / "table.json", json_module.dumps(rows, indent=2) + "\n")
+    write_text(out / "table.json", json_text(rows) + "\n")
     fast_figure(found, out / "figure.png")
     if json:
         print_json(rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, show_checks, write_text
 from qpsafe.cli.outputs import output_folder
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -100,7 +100,7 @@ def path(
     result = to_dict(found, checks, left_out) | {"encounters": {name: item.to_dict() for name, item in near.items()}}
     figure_11(runs["strict"].log, out / "figure.png", "Second experiment, hierarchical law, strict projection")
     side_by_side({name: run for name, run in runs.items() if "," not in name}, robot, out / "side-by-side.png")
-    write_text(out / "report.json", json_module.dumps(result, indent=2) + "\n")
+    write_text(out / "report.json", json_text(result) + "\n")
     if json:
         print_json(result)
     else:

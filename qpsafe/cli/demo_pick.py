@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,6 +20,7 @@ from qpsafe.cli.common import (
     write_text,
 )
 from qpsafe.cli.outputs import output_folder
+from qpsafe.json_text import json_text
 from qpsafe.words import counted
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def pick_and_place(
     if seeds > 1:
         seeds_figure(runs, alone, out / "seeds.png")
         files.append("seeds.png")
-    write_text(out / "report.json", json_module.dumps(result, indent=2) + "\n")
+    write_text(out / "report.json", json_text(result) + "\n")
     if json:
         print_json(result)
     else:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qpsafe.cli.common import print_json, verdict, write_text
+from qpsafe.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,7 +44,7 @@ def every_robot(
         experiment = make(name)
         rows.append(robot_row(experiment.robot, run(experiment, out / name)))
     table = [row.to_dict() for row in rows]
-    write_text(out / "robots.json", json_module.dumps(table, indent=2) + "\n")
+    write_text(out / "robots.json", json_text(table) + "\n")
     if json:
         print_json(table)
     else:

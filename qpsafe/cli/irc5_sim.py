@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import math
 import sys
 from collections import Counter
@@ -16,6 +15,7 @@ from qpsafe.cli.common import SensorName, console, print_json, write_text
 from qpsafe.cli.outputs import output_file
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
+from qpsafe.json_text import json_text
 from qpsafe.words import counted
 
 if TYPE_CHECKING:
@@ -182,5 +182,5 @@ def show(run: RobotRun, screen: Console) -> None:
     if run.counts["answered"] == 0:
         screen.print("nobody answered", style="yellow")
     screen.print(f"{counted(run.cycles, 'cycle')}, {run.late} of them more than 4 ms late themselves")
-    screen.print(json_module.dumps(counts | {"rejected": run.rejected}))
+    screen.print(json_text(counts | {"rejected": run.rejected}, indent=None))
     screen.print(f"fastest joint: {math.degrees(run.speed):.1f} deg/s")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ import typer
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
+from qpsafe.json_text import json_text
 from qpsafe.placement.objective import Objective, check_request
 from qpsafe.words import counted
 
@@ -123,7 +123,7 @@ def place(
     figure_9(result, out / "figure-9.png", machine.title)
     if pictures:
         _draw(machine, found, chosen, out, screen)
-    write_text(out / "report.json", json_module.dumps(report, indent=2) + "\n")
+    write_text(out / "report.json", json_text(report) + "\n")
     remark = _remark(machine.title, result, _command(context), pairs)
     write_text(out / "spots.toml", spots_toml(found, chosen.tolist(), remark))
     if json:

@@ -82,6 +82,7 @@ def inspect(
                 "wire": robot.wire_frames,
                 "spots": spots.names if spots else [],
                 "tools": robot.tool_frames,
+                "held": {joint: value for joint, (value, _) in robot.held.items()},
                 "danger": {"delta": high.delta, "delta_f": low.delta},
                 "notes": robot.notes,
             }
@@ -91,7 +92,8 @@ def inspect(
     sheet = Sheet(f"{robot.title}: joints", headings)
     columns = (robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, robot.home)
     for i, joint in enumerate(robot.joint_names):
-        sheet.add_row(joint, *(f"{np.rad2deg(column[i]):.1f}" for column in columns))
+        scale, name = (1e3, f"{joint} (slides: mm)") if robot.sliding[i] else (180.0 / np.pi, joint)
+        sheet.add_row(name, *(f"{scale * column[i]:.1f}" for column in columns))
     screen.print(sheet)
     screen.print("frames: " + ", ".join(robot.frame_names))
     screen.print("wire:   " + ", ".join(f"{a}-{b}" for a, b in robot.wire_frames))

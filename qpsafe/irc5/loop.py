@@ -67,6 +67,9 @@ class StreamLoop:
         supervisor: Watches over both.
         rules: When to stop.
 
+    Raises:
+        ConfigurationError: A joint slides; the wire has angles.
+
     Attributes:
         tick: Of the controller, the last one; None before.
         events: Names of the task program's events since they were last taken.
@@ -79,6 +82,10 @@ class StreamLoop:
         supervisor: Supervisor | None = None,
         rules: LoopRules | None = None,
     ) -> None:
+        robot = controller.robot
+        if robot.sliding.any():
+            which = [name for name, slides in zip(robot.joint_names, robot.sliding, strict=True) if slides]
+            raise ConfigurationError("StreamLoop", "robot", which, "joints that turn: EGM's joints are angles")
         self.controller, self.session = controller, session
         self.supervisor = Supervisor() if supervisor is None else supervisor
         self.rules = LoopRules() if rules is None else rules

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from qpsafe.errors import RobotFileError
 from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.surface import model_body
+from qpsafe.robot.hulls import solid_geoms
+from qpsafe.robot.mjcf import held_positions
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -70,11 +72,12 @@ class SelfSight:
         except (ValueError, KeyError) as error:
             expected = f"a model that MuJoCo can read ({error})"
             raise RobotFileError(robot.model_path, "model", robot.model_path.name, expected) from None
-        collides = (self._model.geom_contype != 0) | (self._model.geom_conaffinity != 0)
-        self._model.geom_group[:] = np.where(collides | ~collides.any(), 3, 2)
+        self._model.geom_group[:] = np.where(solid_geoms(self._model), 3, 2)
+        self._held = held_positions(self._model, robot.held)
         self._poses, self.around_home = self._free()
         self.configurations = np.array([pose.q for pose in self._poses])
         self._batch = mujoco.batch.Batch(self._model, len(self._poses))
+        self._batch.bind("qpos")[:, self._held[0]] = self._held[1]
         self._batch.bind("qpos")[:, self._q] = self.configurations
 
     def _free(self) -> tuple[list[_Pose], int]:
@@ -83,6 +86,8 @@ class SelfSight:
 
         robot, model, data = self.robot, self._model, mujoco.MjData(self._model)
         rng, home = np.random.default_rng(0), robot.home
+
+        data.qpos[self._held[0]] = self._held[1]
 
         def touching(q: Array) -> set[tuple[int, ...]]:
             data.qpos[self._q] = q

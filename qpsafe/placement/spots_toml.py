@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
 
+from qpsafe.json_text import json_text
 from qpsafe.placement.candidates import Candidates
 
 
@@ -26,7 +26,7 @@ def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> st
     lines = [f"# {line}" for line in wrap(remark, 118)]
     lines += [
         "",
-        f"sensor = {json.dumps(sensor.name)}",
+        f"sensor = {json_text(sensor.name)}",
         f"range_min = {sensor.range_min!r}    # [m]",
         f"range_max = {sensor.range_max!r}    # [m]",
         f"field_of_view = {round(float(np.rad2deg(sensor.field_of_view)), 9)!r} # [deg] full angle of the cone it sees",
@@ -35,9 +35,9 @@ def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> st
         lines += [
             "",
             "[[spot]]",
-            f"name = {json.dumps(nodes.names[i])}",
+            f"name = {json_text(nodes.names[i])}",
             f"link = {int(nodes.links[i]) + 1}",
-            f"frame = {json.dumps(nodes.frames[i])}",
+            f"frame = {json_text(nodes.frames[i])}",
             f"position = {_vector(nodes.positions[i], 5)}",
             f"direction = {_vector(nodes.directions[i], 7)}",
         ]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import MissingExtraError, RobotFileError
+from qpsafe.robot.mjcf import held_positions
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -76,6 +77,8 @@ def _model_at_home(robot: Robot, frame: str) -> tuple[Any, Any, int]:
     try:
         model = mujoco.MjModel.from_xml_path(str(robot.model_path))
         data = mujoco.MjData(model)
+        addresses, values = held_positions(model, robot.held)
+        data.qpos[addresses] = values
         for name, value in zip(robot.joint_names, robot.home, strict=True):
             data.qpos[model.joint(name).qposadr] = value
         body = model_body(model, robot, frame)

@@ -49,6 +49,10 @@ class CostTask(Task):
         """The task's own, not scaled."""
         return self.task.error(value, sample)
 
+    def offset(self, value: Array, sample: Any) -> Array:
+        """The task's own."""
+        return self.task.offset(value, sample)
+
     def jacobian(self, state: RobotState) -> Array:
         """cost J, (rows, n)."""
         return (self.cost * self.task.jacobian(state).T).T

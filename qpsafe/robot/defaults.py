@@ -120,7 +120,8 @@ def _check_limits(path: Path, names: tuple[str, ...], values: dict[str, NDArray[
     for key, array in values.items():
         for name, value in zip(names, array, strict=True):
             if not (np.isfinite(value) and abs(value) < _NO_LIMIT):
-                raise RobotFileError(path, f"{name}.{key}", float(value), "a finite limit")
+                expected = f"a finite limit: state it ({key}=...) or hold {name}"
+                raise RobotFileError(path, f"{name}.{key}", float(value), expected)
             if key.startswith("max_") and not value > 0:
                 raise RobotFileError(path, f"{name}.{key}", float(value), "a number above zero")
     for name, low, high in zip(names, values["lower"], values["upper"], strict=True):

@@ -27,7 +27,7 @@ def solid_geoms(model: Any) -> NDArray[np.bool_]:
 
 
 def hulls_of_mjcf(path: Path, compiled: Compiled, places: dict[int, tuple[int, Any]]) -> list[BodyHull]:
-    """Hulls of the geoms that are the robot's body.
+    """Hulls of the geoms that are the robot's body; those of the file's world, but for planes, are its base.
 
     Args:
         path: The file, for errors.
@@ -40,11 +40,12 @@ def hulls_of_mjcf(path: Path, compiled: Compiled, places: dict[int, tuple[int, A
     import mujoco
 
     model, result, rotation = compiled.model, [], np.empty(9)
-    own = np.isin(model.geom_bodyid, compiled.bodies)
+    plane = model.geom_type <= int(mujoco.mjtGeom.mjGEOM_HFIELD)
+    own = np.isin(model.geom_bodyid, compiled.bodies) | ((model.geom_bodyid == 0) & ~plane)
     of_robot = np.flatnonzero(own & solid_geoms(model))
     if not len(of_robot):  # what collides is none of the robot's
         of_robot = np.flatnonzero(own)
-    for geom in of_robot:
+    for geom in map(int, of_robot):
         body = int(model.geom_bodyid[geom])
         name = model.geom(geom).name or f"{compiled.body_names[body]}_{geom - model.body_geomadr[body]}"
         points = corners.of_geom(model, geom)

@@ -3,7 +3,7 @@
 A joint that is held is no joint for the controller: its bodies are fixed where its value puts them. Held are
 
 - joints that the caller holds, at the values given;
-- joints that neither turn nor slide (free, ball, planar);
+- joints that neither turn nor slide (free, ball, planar), and those that the file locks;
 - grippers: joints on several branches that move one another (mimic, joint equalities, closed loops) and carry no other;
 - fingers: sliding joints that carry no other joint and hang side by side on one body.
 
@@ -99,6 +99,12 @@ def choose_joints(
     if other:
         notes.append(f"joints that neither turn nor slide are held in place: {', '.join(other)}")
     carried = _carried(joints, movable)
+    locked = [joint for joint in joints if joint.follows is not None and joint.follows.source == joint.name]
+    for joint in locked:
+        held.setdefault(joint.name, joint.rest)
+    _follow(joints, held, {joint.name for joint in locked if joint.name not in hold})
+    if locked:
+        notes.append(f"joints that the file locks are held in place: {', '.join(joint.name for joint in locked)}")
     grippers = []
     for group in _groups(joints):
         free = [name for name in group if name in movable and name not in held]
@@ -162,7 +168,7 @@ def _groups(joints: Sequence[FoundJoint]) -> list[list[str]]:
     for joint in joints:
         if joint.loop is not None:
             loops.setdefault(joint.loop, []).append(joint.name)
-        if joint.follows is not None:
+        if joint.follows is not None and joint.follows.source != joint.name:
             source, seen = joint.follows.source, {joint.name}
             while source not in seen and (above := by_name[source].follows) is not None:
                 seen.add(source)

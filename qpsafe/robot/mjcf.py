@@ -6,6 +6,7 @@ MuJoCo resolves includes, default classes, frames, references, angles and plugin
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
@@ -13,7 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from qpsafe.errors import RobotFileError
-from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint
+from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint, HeldJoint
 
 #: Range of a joint that turns without end, either way: so far that it is never met, and a finite number [rad].
 ENDLESS = 2000.0 * np.pi
@@ -123,6 +124,21 @@ def compile_mjcf(path: Path, root: Element) -> Compiled:
     return Compiled(model, bodies, body_names, tuple(joints), ids, tuple(notes), stand)
 
 
+def held_positions(model: Any, held: Mapping[str, HeldJoint], prefix: str = "") -> tuple[list[int], list[float]]:
+    """Where the positions of held joints are in `qpos` of a MuJoCo model, and what they are.
+
+    Args:
+        model: A model that the robot is in.
+        held: `Robot.held`.
+        prefix: What stands before the robot's names there.
+    """
+    import mujoco
+
+    ids = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + name) for name in held}
+    found = [(int(model.jnt_qposadr[j]), held[name].value) for name, j in ids.items() if j >= 0]
+    return [address for address, _ in found], [value for _, value in found]
+
+
 def _robot_bodies(model: Any) -> tuple[tuple[int, ...], list[int]]:
     """Bodies of the robot, and the roots of what is none: mocap bodies, flexible things, and objects without an arm.
 
@@ -162,26 +178,30 @@ def _equalities(
     """Joints that follow others, joints in closed loops, and the constraints of other kinds."""
     import mujoco
 
-    kinds, couplings, loops, others = mujoco.mjtEq, {}, {}, []
+    kinds = mujoco.mjtEq
+    couplings: dict[int, Coupling] = {}
+    loops: dict[int, int] = {}
+    others: list[int] = []
     for e in range(model.neq):
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         if not model.eq_active0[e]:
             continue
         if int(model.eq_type[e]) == kinds.mjEQ_JOINT:
-            source = second if second >= 0 else first  # alone, it is held where it is
-            own, at = model.qpos0[model.jnt_qposadr[[first, source]]]
-            if second >= 0:
-                couplings[first] = Coupling(names[source], tuple(model.eq_data[e, :5]), own, at)
-            else:
-                couplings[first] = Coupling(names[first], (float(model.eq_data[e, 0]),), own)
+            alone = second < 0  # locked: it "follows" itself by a constant
+            source = first if alone else second
+            if bodies.issuperset(model.jnt_bodyid[[first, source]].tolist()):
+                own, at = model.qpos0[model.jnt_qposadr[[first, source]]].tolist()
+                coefficients = model.eq_data[e, : 1 if alone else 5].tolist()
+                couplings[first] = Coupling(names[source], tuple(coefficients), own, at)
         elif int(model.eq_type[e]) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             ends = [first, second]
             if int(model.eq_objtype[e]) == mujoco.mjtObj.mjOBJ_SITE:
                 ends = [int(model.site_bodyid[site]) for site in ends]
             if all(end == 0 or end in bodies for end in ends):
                 one, other = (_joints_towards_world(model, end) for end in ends)
-                number = min((loops[j] for j in one ^ other if j in loops), default=e)
-                loops.update(dict.fromkeys(one ^ other, number))
+                touched = {loops[j] for j in one ^ other if j in loops}  # loops that share a joint are one
+                members = (one ^ other) | {j for j, number in loops.items() if number in touched}
+                loops.update(dict.fromkeys(members, e))
         else:
             others.append(e)
     return couplings, loops, others

@@ -63,10 +63,10 @@ def build_model(compiled: Compiled, held: Mapping[str, float]) -> Built:
     kind = pin.FrameType
 
     def add_sites(body: int, parent: int, place: Any, frame: int) -> None:
-        for site in np.flatnonzero(mj.site_bodyid == body):
+        for site in map(int, np.flatnonzero(mj.site_bodyid == body)):
             if site in site_names:
                 there = place * _placement(mj.site_pos[site], mj.site_quat[site])
-                sites[int(site)] = _add(model, pin.Frame(site_names[site], parent, frame, there, kind.OP_FRAME))
+                sites[site] = _add(model, pin.Frame(site_names[site], parent, frame, there, kind.OP_FRAME))
 
     add_sites(0, 0, pin.SE3.Identity(), 0)
     for body in compiled.bodies:

@@ -107,8 +107,8 @@ class Robot(Fixed):
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
         self.memory = self.tree.memory
-        self.sliding = ~self.tree.axes[:, 3:].any(axis=1)
-        self.endless = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
+        self.sliding: NDArray[np.bool_] = ~np.any(self.tree.axes[:, 3:], axis=1)
+        self.endless: NDArray[np.bool_] = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
         frames = {name: model.frames[index] for name, index in self._frame_ids.items()}
         self._mountings = {
             name: (int(frame.parentJoint), _read_only(frame.placement.homogeneous)) for name, frame in frames.items()
@@ -162,6 +162,18 @@ class Robot(Fixed):
     def wire(self, q: ArrayLike, qd: ArrayLike) -> Wire:
         """Segments of the wire model and the velocities of their ends, eq. (4), each (links, 3) [m, m/s]."""
         return self.at(q).wire(qd)
+
+    def nearest(self, goal: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
+        """Joint positions that mean the same as `goal` and are nearest to q: whole turns less on endless joints, (n,).
+
+        A `JointMove` to them takes the short way.
+
+        Raises:
+            ConfigurationError: goal or q has the wrong shape.
+        """
+        there, here = self.joint_vector(goal, "goal"), self.joint_vector(q, "q")
+        turns = np.round((there - here) / (2.0 * np.pi))
+        return there - np.where(self.endless, 2.0 * np.pi * turns, 0.0)
 
     def frame_id(self, frame: str) -> int:
         """pinocchio's index of a frame.

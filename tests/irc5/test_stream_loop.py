@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import qpsafe
-from qpsafe.irc5.loop import LoopRules, gate
+from qpsafe.irc5.loop import LoopRules, StreamLoop, gate
 from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
 from qpsafe.sim.irc5 import IdealBody, SimulatedIrc5
@@ -195,6 +195,12 @@ def test_a_controller_that_fails_stops_the_robot(cell: Cell) -> None:
     cell.run(100)
     assert cell.state is State.STOPPED
     assert "law on fire" in cell.causes()
+
+
+def test_a_robot_that_slides_is_not_streamed_as_angles(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cell.robot, "sliding", np.array([True, False, False, False, False, False]))
+    with pytest.raises(qpsafe.ConfigurationError, match=r"joint_1.*angles"):
+        StreamLoop(cell.here.loop.controller, cell.here.loop.session)
 
 
 def test_the_gate_names_what_is_closed() -> None:

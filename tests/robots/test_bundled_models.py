@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import sys
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -15,6 +17,7 @@ from scipy.spatial import ConvexHull
 
 import qpsafe
 from qpsafe.robot.loader import bundled_robots, load_robot
+from qpsafe.sensing.body import body_hulls
 
 pytestmark = pytest.mark.parametrize("name", bundled_robots())
 
@@ -61,6 +64,28 @@ def test_mujoco_and_pinocchio_see_the_same_robot(name: str) -> None:
             np.testing.assert_allclose(state.position(frame), position, rtol=0, atol=1e-12)
             np.testing.assert_allclose(state.rotation(frame), rotation.reshape(3, 3), rtol=0, atol=1e-12)
             np.testing.assert_allclose(state.jacobian(frame), jacobian, rtol=0, atol=1e-12)
+
+
+def test_the_same_files_in_another_folder_are_the_same_robot(name: str, tmp_path: Path) -> None:
+    """There MuJoCo compiles the MJCF; the bundled robots are read without it."""
+    robot, _, configurations = loaded(name)
+    copied = load_robot(shutil.copytree(robot.folder, tmp_path / name))
+    assert copied.notes == robot.notes == ()
+    for key in ("joint_names", "frame_names", "wire_frames", "tool_frames"):
+        assert getattr(copied, key) == getattr(robot, key)
+    for key in ("lower", "upper", "max_velocity", "max_acceleration", "home"):
+        np.testing.assert_array_equal(getattr(copied, key), getattr(robot, key))
+    for q in configurations[:5]:
+        state, other = robot.at(q), copied.at(q)
+        for frame in robot.frame_names:
+            np.testing.assert_allclose(other.pose(frame), state.pose(frame), rtol=0, atol=1e-12)
+            np.testing.assert_allclose(other.jacobian(frame), state.jacobian(frame), rtol=0, atol=1e-12)
+    for (joint, what, points), (other_joint, other_what, own) in zip(
+        body_hulls(robot), body_hulls(copied), strict=True
+    ):
+        assert (joint, what) == (other_joint, other_what)
+        np.testing.assert_allclose(own.min(axis=0), points.min(axis=0), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(own.max(axis=0), points.max(axis=0), rtol=0, atol=1e-9)
 
 
 def test_inertia_and_gravity_are_the_same_too(name: str) -> None:
