@@ -4,6 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= out/demo-fixed
 TYPED  := build/typed
+# two processes that share files of tests, not single tests: a file's experiments are simulated once; tests/conftest.py orders
+SHARED := -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: demo test test-slow dev lint bench clean
 
@@ -11,10 +13,10 @@ demo: $(VENV)/.demo ## the source's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest $(SHARED) -m "not slow"
 
 test-slow: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest $(SHARED)
 
 dev: $(VENV)/.dev ## everything for working on the project
 	@echo "ready: $(BIN)/qpsafe --help"

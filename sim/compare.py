@@ -12,9 +12,11 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.problem import Law, LawProblem, LawResult
 from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.robot_stage import robot_stage
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
+    from qpsafe.sim.choreography import Choreography
 
 
 @dataclass
@@ -90,6 +92,7 @@ def compare_closed_loop(
     duration: float = 60.0,
     solver: str | None = None,
     progress: Callable[[], None] | None = None,
+    choreography: Choreography | None = None,
 ) -> ClosedLoop:
     """Run the first experiment three times: (22) and its QP form without limits, and the QP form with limits.
 
@@ -98,11 +101,13 @@ def compare_closed_loop(
         duration: Length of each run [s].
         solver: Solver of the QPs.
         progress: Called after every tick, 3 duration / dt times.
+        choreography: How the person moves; None for the first experiment's.
     """
+    walk = robot_stage(robot).choreography if choreography is None else choreography
 
     def run(law: Law, limits: bool) -> Any:
         observer = None if progress is None else lambda *_: progress()
-        return FixedExperiment(robot, law, limits=limits, duration=duration).run(observer)
+        return FixedExperiment(robot, law, limits=limits, duration=duration, choreography=walk).run(observer)
 
     source = run(NullspaceLaw(), False)
     free = run(HierarchicalLaw("paper", solver=solver), False)

@@ -101,7 +101,7 @@ def run_matrix(
     total = moments[-1] + 1 + count * (len(cases) + 1) * WINDOW
     reading = np.full(0, np.inf)
     for k in range(moments[-1] + 1):
-        if np.isfinite(reading).any():  # where nobody sees anything there is nothing to lose
+        if k in moments and np.isfinite(reading).any():  # where nobody sees anything there is nothing to lose
             copies += [(loop.copy(), reading)] * moments.count(k)
         reading = loop.step().distances
         loop.advance()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,26 @@ from typer.testing import CliRunner
 import qpsafe
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
+from qpsafe.placement import candidates
+from qpsafe.robot.robot import Robot
 
+
+@pytest.fixture(autouse=True)
+def _nodes_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same candidates for all commands here: finding them takes most of a command's time."""
+    monkeypatch.setattr(candidates, "candidate_nodes", _found)
+
+
+@cache
+def _found_by_name(name: str, wanted: int) -> candidates.Candidates:
+    return _find(qpsafe.load_robot(name), wanted)
+
+
+def _found(robot: Robot, wanted: int) -> candidates.Candidates:
+    return _found_by_name(robot.name, wanted)
+
+
+_find = candidates.candidate_nodes
 QUICK = ["place", "--nodes", "40", "--pairs", "60", "--no-pictures", "--no-exact"]
 
 

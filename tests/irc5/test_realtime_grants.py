@@ -4,6 +4,8 @@ import gc
 import subprocess
 import sys
 
+import pytest
+
 from qpsafe.irc5 import realtime
 
 
@@ -14,6 +16,7 @@ def fresh(code: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for its scheduler and its locked memory")
 def test_every_answer_is_one_line_and_matches_the_system() -> None:
     code = (
         "import os\n"
@@ -24,8 +27,6 @@ def test_every_answer_is_one_line_and_matches_the_system() -> None:
         "locked = [line for line in open('/proc/self/status') if line.startswith('VmLck')]\n"
         "print(int(locked[0].split()[1]) > 0)\n"
     )
-    if sys.platform != "linux":
-        return
     agrees, granted, fifo_line, lock_line, locked = fresh(code).split("\n")
     assert agrees == "True"
     assert granted == locked
@@ -64,6 +65,16 @@ def test_what_is_alive_is_frozen() -> None:
     assert gc.get_freeze_count() == 0
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux's timer slack")
+def test_sleeps_end_when_they_should() -> None:
+    code = (
+        "import ctypes\n"
+        "from qpsafe.irc5.realtime import fine_timers\n"
+        "fine_timers()\n"
+        "print(ctypes.CDLL(None).prctl(30, 0, 0, 0, 0))"  # PR_GET_TIMERSLACK [ns]
+    )
+    assert fresh(code) == "1"
+
+
 def test_memory_in_use_is_told() -> None:
     assert realtime.resident() > 1_000_000 or sys.platform != "linux"
-    realtime.fine_timers()

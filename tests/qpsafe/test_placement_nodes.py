@@ -70,8 +70,13 @@ def test_directions_point_out_of_the_body(nodes: Candidates) -> None:
         assert own.find((origin - 0.002 * direction)[None], zero, state.body_poses())[0] >= 0
 
 
-def test_the_spacing_is_found_that_gives_the_wanted_number() -> None:
-    assert len(candidate_nodes(ROBOT, 41)) == 41
+def test_the_spacing_is_found_that_gives_the_wanted_number(tmp_path: Path) -> None:
+    """On two regions; on all of them it is found for `nodes`."""
+    file = (ROBOT.folder / "robot.toml").read_text(encoding="utf-8")
+    regions = file[file.index("[[regions]]") :].split("[[regions]]")
+    few = with_regions(tmp_path, "[[regions]]".join(["", *regions[-2:]]))
+    assert len(few.regions) == 2
+    assert len(candidate_nodes(few, 17)) == 17
 
 
 def test_self_sight_is_that_of_every_ray_cast_in_every_pose() -> None:

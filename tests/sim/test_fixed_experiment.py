@@ -28,6 +28,12 @@ def log(experiment: FixedExperiment) -> RunLog:
     return experiment.run()
 
 
+@pytest.fixture(scope="module")
+def without(experiment: FixedExperiment) -> np.ndarray:
+    """Distance to the board of a robot that just stands there."""
+    return experiment.board_distance_without_controller()
+
+
 def norm(error: np.ndarray) -> np.ndarray:
     return np.linalg.norm(error, axis=1)
 
@@ -67,11 +73,12 @@ def test_errors_stay_where_the_danger_level_allows_them(log: RunLog, experiment:
     assert orientation[after].max() < 1e-2
 
 
-def test_controller_keeps_the_robot_farther_from_the_board(log: RunLog, experiment: FixedExperiment) -> None:
-    without = experiment.board_distance_without_controller()
+def test_controller_keeps_the_robot_farther_from_the_board(
+    log: RunLog, experiment: FixedExperiment, without: np.ndarray
+) -> None:
     for start, end in experiment.windows():
         inside = (log.time >= start) & (log.time < end)
-        assert log.board_distance[inside].min() > without[inside].min() + 0.005
+        assert log.board_distance[inside].min() > without[inside].min() + 0.012  # 15 to 20 mm are measured
     assert without[0] == pytest.approx(log.board_distance[0], abs=1e-12)  # the same start in both
 
 
@@ -89,8 +96,9 @@ def test_robot_is_at_its_first_pose_again_without_a_wrist_flip(log: RunLog) -> N
 
 
 def test_shorter_run_is_the_beginning_of_the_longer_one_bit_by_bit(log: RunLog) -> None:
-    short = FixedExperiment(ROBOT, duration=9.0).run()
+    short = FixedExperiment(ROBOT, duration=6.0).run()
     n = len(short.time)
+    assert (short.regime != "low").any()  # it has something to differ in
     for name in ("q_ref", "qd_ref", "q", "qd", "cdf_n", "distances", "board_distance", "euler_error"):
         assert np.array_equal(getattr(short, name), getattr(log, name)[:n]), name
 
@@ -110,10 +118,10 @@ def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
 def test_the_robot_sees_itself_and_it_does_not_count() -> None:
     """A longer hold bends the arm farther back: the upper arm's rear spot sees the robot's own body for a second."""
     robot, stage = ROBOT.with_spots("spots-by-hand.toml"), robot_stage(ROBOT).choreography
-    farther = replace(stage.approaches[0], medium_distance=1.02)
+    farther = replace(stage.approaches[0], start=0.3, medium_distance=1.02)
     stage = replace(stage, approaches=(farther,))
     rules = qpsafe.SensingRules(hold_time=0.3)
-    experiment = FixedExperiment(robot, rules=rules, duration=11.0, choreography=stage)
+    experiment = FixedExperiment(robot, rules=rules, duration=8.0, choreography=stage)
     log = experiment.run()
     assert set(log.status) == {"ok"}
     spots = qpsafe.load_spots(robot)
@@ -131,8 +139,8 @@ def test_the_robot_sees_itself_and_it_does_not_count() -> None:
     assert own.get("upper arm rear", 0) > 100, own
 
 
-def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperiment) -> None:
-    report = summarise(log, experiment.board_distance_without_controller(), experiment.windows(), ROBOT)
+def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperiment, without: np.ndarray) -> None:
+    report = summarise(log, without, experiment.windows(), ROBOT)
     assert report.kept, [check for check in report.checks if not check.kept]
     assert len(report.regimes) >= 13
     assert report.tracking[0] < 2e-3
@@ -140,14 +148,14 @@ def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperimen
 
 def test_a_shorter_run_leaves_promises_out_and_breaks_none(log: RunLog, experiment: FixedExperiment) -> None:
     """However early a good run ends: what did not happen is named, the rest is kept, nothing is both or neither."""
-    n, without, windows = len(log.time), np.zeros(len(log.time)), experiment.walk.windows
+    n, nowhere, windows = len(log.time), np.zeros(len(log.time)), experiment.walk.windows
     names = None
     for ticks in (n, 1, 2, 250, *range(1000, n, 1000)):
         parts = {f.name: getattr(log, f.name) for f in fields(log)}
         short = type(log)(
             **{k: v[:ticks] if isinstance(v, np.ndarray) and len(v) == n else v for k, v in parts.items()}
         )
-        report = summarise(short, without[:ticks], windows, ROBOT)
+        report = summarise(short, nowhere[:ticks], windows, ROBOT)
         assert report.kept, (ticks, [check for check in report.checks if not check.kept])
         found = [*(check.name for check in report.checks), *report.left_out]
         names = names or sorted(found)  # of the whole run
@@ -156,9 +164,8 @@ def test_a_shorter_run_leaves_promises_out_and_breaks_none(log: RunLog, experime
     assert len(report.checks) < len(names)  # type: ignore[arg-type]
 
 
-def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment) -> None:
+def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment, without: np.ndarray) -> None:
     """A log with each promise broken in turn must not pass as kept."""
-    without = experiment.board_distance_without_controller()
 
     def broken(log: RunLog, without: np.ndarray = without) -> set[str]:
         report = summarise(log, without, experiment.windows(), ROBOT)

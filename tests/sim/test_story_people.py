@@ -99,8 +99,12 @@ def sampled(story: Story, duration: float | None = None) -> np.ndarray:
     return np.array([[pose.ends for pose in story.poses(t)] for t in times])
 
 
-def test_nothing_jumps_and_bones_keep_their_lengths(story: Story) -> None:
-    ends = sampled(story)
+@pytest.fixture(scope="module")
+def ends(story: Story) -> np.ndarray:
+    return sampled(story)
+
+
+def test_nothing_jumps_and_bones_keep_their_lengths(story: Story, ends: np.ndarray) -> None:
     speed = np.linalg.norm(np.diff(ends, axis=0), axis=-1) / DT
     assert speed.max() < 8.5  # a swinging foot goes at about four times the walking speed
     jolt = np.linalg.norm(np.diff(ends, n=2, axis=0), axis=-1) / DT  # change of velocity in a tick
@@ -151,8 +155,7 @@ def test_whoever_walks_looks_where_they_walk(story: Story) -> None:
             assert abs(off) < math.radians(20.0)
 
 
-def test_standing_feet_do_not_slide_and_feet_stay_above_the_floor(story: Story) -> None:
-    ends = sampled(story)
+def test_standing_feet_do_not_slide_and_feet_stay_above_the_floor(story: Story, ends: np.ndarray) -> None:
     for k, actor in enumerate(story.people):
         radius = actor.person.body.foot_radius
         for row in (7, 13):  # left and right foot
