@@ -16,7 +16,9 @@ from qpsafe.danger.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.problem import Law
+from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.limits import JointLimits
 from qpsafe.quick import Quick
 from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
@@ -24,13 +26,14 @@ from qpsafe.reference import JointReference
 from qpsafe.resolve import Resolved, judged, resolve
 from qpsafe.returns import GentleLimits
 from qpsafe.robot.state import RobotState
-from qpsafe.sense import sense
+from qpsafe.sense import Sensed, sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.speed_cap import slowed
+from qpsafe.stall import StallWatch
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
@@ -39,6 +42,9 @@ if TYPE_CHECKING:
 
 #: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint, tuned on the first experiment.
 DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
+_CALM = 0.01  # [rad/s] evasive velocity that does not explain motion
+_BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep from what nobody else knows
+_WAY_LAW = HierarchicalLaw()
 
 
 class SafetyController:
@@ -108,6 +114,7 @@ class SafetyController:
         self.evasion.reset()
         if self.sensing is not None:
             self.sensing.reset()
+        self._stall = StallWatch(self.robot, self.dt, self.recovery_rules.tolerance, self.recovery_rules.patience)
         self._seq = -1
         self._active = False
         self._q = self.robot.home.copy()
@@ -218,19 +225,24 @@ class SafetyController:
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self.activation.at(cdf_n)
         commanded = RobotState(self.robot, self._q)
+        if self._seq % self._stall.every == 0 or self._stall.held:
+            self._look(seen, commanded, activations)
         samples = self.recovery.update(cdf_n, commanded, activations)
+        tasks, active, law, way = self.tasks, activations, self.law, self.recovery.way
+        if way is not None:  # back through the joints
+            tasks, active, law = way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         limits, qdd = self.limits, (self._qd - self._qd_before) / self.dt
         if self.recovery.phase == RECOVERING and limits:
             limits = self._gentle.choose(limits, self._q, self._qd, qdd)
-        resolver = None if self.barrier else self._quick.resolver(self.tasks, self.law, limits)
+        resolver = None if self.barrier or way else self._quick.resolver(tasks, law, limits)
         resolved = None if resolver is None else resolver(commanded, self._qd, samples, qd0, activations)
         if resolved is None:
             box = limits.box(self._q, self._qd, qdd) if limits else None
             barrier = self.barrier and self.barrier.level(seen.measured, self._qd, seen.points, seen.danger)
             soft = (barrier,) if barrier else ()
-            resolved = resolve(commanded, self.tasks, samples, qd0, activations, self.law, box, soft, self.dt)
+            resolved = resolve(commanded, tasks, samples, qd0, active, law, box, soft, self.dt)
         command, usual = resolved.command, resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self.robot.joint_names)
         if self.barrier:  # exact, as far as the acceleration limits allow
@@ -239,10 +251,13 @@ class SafetyController:
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
 
+        if self._stall.held:
+            command = self._braked()
+
         # integrate -> joint reference, now that nothing of the user's can fail any more
         path_time = self.recovery.path_time
         off_path = None if self.recovery.on_path else partial(_errors, self.tasks, commanded, path_time)
-        messages = (*messages, *seen.notes)
+        messages = (*self._stall.messages, *messages, *seen.notes)
         return Tick(
             reference=self._advance(command),
             cdf_n=cdf_n,
@@ -268,8 +283,7 @@ class SafetyController:
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
         box = self._brake_limits.box(self._q, self._qd)
-        most = self._brake_limits.max_acceleration * self.dt
-        slower = self._qd - np.clip(self._qd, -most, most)  # inside the box, whose speeds can all be braked
+        slower = self._braked()
         qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # no danger is known: what was known fades
         none = (0.0,) * len(self.tasks)
         return Tick(
@@ -287,6 +301,25 @@ class SafetyController:
             joint_names=self.robot.joint_names,
             resolved=Resolved(slower, 0.0, False, box, None, ()),
         )
+
+    def _braked(self) -> NDArray[np.float64]:
+        """The last command, braked as hard as allowed: inside the box, whose speeds can all be braked."""
+        most = self._brake_limits.max_acceleration * self.dt
+        return self._qd - np.clip(self._qd, -most, most)
+
+    def _look(self, seen: Sensed, commanded: RobotState, activations: tuple[float, ...]) -> None:
+        """See whether the robot does not get on, with nothing to explain it, and find another way back if it is lost."""
+        stall, recovery = self._stall, self.recovery
+        explained = seen.capped or not min(activations) >= 1.0 or (self.barrier and len(seen.points) > 0)
+        explained = explained or recovery.way is not None
+        if explained and stall.held:
+            stall.clear()
+        if self._seq % stall.every == 0:
+            bundled = isinstance(self.law, _BUNDLED)
+            calm = bundled and float(np.abs(seen.qd0).max()) < _CALM
+            stall.look(self.tasks, commanded, self._qd, recovery.path_time, explained, calm)
+            if stall.stalled and stall.met is not None and bundled and recovery.lead(stall.met):
+                stall.clear()
 
     def _advance(self, command: NDArray[np.float64]) -> JointReference:
         """Integrate; the reference's arrays are nobody else's."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.returns import RecoveryRules, Return, minimum_jerk, run_out
+from qpsafe.tasks.joint import JointTask
+from qpsafe.tasks.trajectory import FixedJoints
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
@@ -51,7 +53,9 @@ class Recovery:
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
         self.waits_for: tuple[str, ...] = ()
         self._rate = 1.0  # of the clock
-        self._changed = False
+        self._changed = self._led = False
+        #: The way back through the joints, while it is taken.
+        self.way: Recovery | None = None
         self._cursors: list[_Cursor] = []
         self.set_tasks(tasks, suspend_above, restart=True)
         self._changed = False
@@ -69,6 +73,7 @@ class Recovery:
             self.path_time = 0.0
         self.tasks = tuple(tasks)
         self.suspend_above = suspend_above
+        self.way = None
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
@@ -84,12 +89,15 @@ class Recovery:
     @property
     def clocks(self) -> tuple:
         """Times on the path and on the returns; set them back when the robot could not go along."""
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending)
+        way = None if self.way is None else self.way.clocks
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), way
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
         self.path_time, self._rate = clocks[:2]
         self._returns, self._pending = list(clocks[2]), list(clocks[3])
+        if self.way is not None and clocks[4] is not None:
+            self.way.clocks = clocks[4]
 
     def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
         """Advance one tick and give each task its reference.
@@ -112,6 +120,11 @@ class Recovery:
             samples = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
             self._last = [(state, sample) for sample in samples]  # only the last tick's will be of interest
             return tuple(samples)
+        if self.way is not None:
+            samples = self.way.update(cdf_n, state, (min(activations),))
+            if self.way.phase != FOLLOWING:
+                return samples
+            self.way = None  # there: what is left is the way from a posture that met the tasks
         return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
 
     @property
@@ -148,8 +161,28 @@ class Recovery:
         else:
             self._advance(state)
 
+    def lead(self, posture: NDArray[np.float64]) -> bool:
+        """Return through the joints, straight to a posture (n,) [rad], and from there to the path.
+
+        The way for a robot that is recovering and does not get on: joint limits that block the straight way of a pose
+        never block that of the joints. It is taken once between two dangers.
+
+        Returns:
+            Whether it goes there now; `way` then has the task and, at every tick, its reference.
+        """
+        if self.phase != RECOVERING or self._led or not self.rules.enabled:
+            return False
+        task = JointTask(FixedJoints(posture))
+        self._led, self.way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
+        self.way.set_tasks([task], self.suspend_above, restart=False)
+        self._returns = [None] * len(self.tasks)
+        self._pending = [True] * len(self.tasks)
+        self._offsets = [None] * len(self.tasks)
+        return True
+
     def _suspend(self) -> None:
         self.phase, self._rate = SUSPENDED, 0.0
+        self.way, self._led = None, False
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
 

@@ -90,7 +90,8 @@ def resolve(
     wanted = [task.clik(commanded, sample) for task, sample in zip(tasks, samples, strict=True)]
     wishes = tuple([TaskVelocity(jacobian, velocity) for jacobian, velocity, _ in wanted])
     lower, upper = (box.lower.copy(), box.upper.copy()) if box else (None, None)
-    result = law.solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
+    corrections = tuple([task.gain * clik.error for task, clik in zip(tasks, wanted, strict=True)])
+    result = law.solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft, corrections))
     answer = checked_velocity(result, commanded.q, dt)
     command, excess = box.admit(answer) if box else (answer.copy(), 0.0)
     return Resolved(command, excess, result.status == SOLVED, box, result, tuple([clik.error for clik in wanted]))
@@ -138,7 +139,8 @@ class Resolver:
         self._gains = np.empty(len(tasks))
         self._layout = layout_for(robot.nq, counts)
         n, rows, kinds = robot.nq, sum(counts), len(tasks) + 1
-        self._weights = np.empty(kinds)
+        self._corrections = np.empty(rows)  # K e
+        self._weights, self._near = np.empty(kinds), np.zeros(kinds)  # damping of each level; the closing one has none
         self._floats = rows * n + 2 * rows + (3 + kinds) * n  # of `parts`
         self._integers = 3 * n + kinds * (HEADER + 2 * n + rows)
 
@@ -179,7 +181,7 @@ class Resolver:
         command, floats, integers = np.empty(len(qd)), np.zeros(self._floats), np.zeros(self._integers, dtype=np.int64)
         excess, worst = resolve_quickly(
             state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, weights, self._law.damping,
-            *self._layout, floats, integers, command,
+            self._law.damping_time, self._near, self._corrections, *self._layout, floats, integers, command,
         )  # fmt: skip
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")

@@ -14,6 +14,8 @@ from qpsafe.hqp import own_regimes
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import solve_regimes
 from qpsafe.hqp.own_solver import MODULES
+from qpsafe.laws import damping as laws_damping
+from qpsafe.laws.damping import threshold_compiled
 from qpsafe.limits import admit_into, box_into
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
@@ -70,21 +72,22 @@ _any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
 @entry(
     types.UniTuple(types.float64, 2)(
         _any, _any, _one, _two, types.int64, _ints, _three, _ints, readable(2), types.float64, types.float64,
-        _one, readable(3), readable(2), _one, _one, types.float64,
+        _one, readable(3), readable(2), _one, _one, types.float64, types.float64, types.float64[::1], types.float64[::1],
         types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
         _ints, types.float64[::1], types.int64[::1], types.float64[::1],
     ),
-    kinematics, clik, limits_module, own_regimes, *MODULES,
+    kinematics, clik, limits_module, laws_damping, own_regimes, *MODULES,
 )  # fmt: skip
 def resolve_quickly(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
     limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
-    weights: Array, damping: float, work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index,
-    ends: Index, floats: Array, integers: Index, command: Array,
+    weights: Array, damping: float, damping_time: float, near: Array, correction: Array, work: Array, int_work: Index, m: int,
+    matrix: Array, target: Array, last: Index, ends: Index, floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill floats and integers (zeros; see `Parts`), command; returns excess, -1 if q̇ is absurd, and the worst code."""
     A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, q.shape[0], rows.shape[0], weights.shape[0])
     poses, axes, _, _ = cut(memory, q.shape[0], k)
+    square = damping * damping
     # CLIK: ẋ = ẋ_d + K e
     for t in range(bodies.shape[0]):
         first, stop = (ends[t - 1] if t > 0 else 0), ends[t]
@@ -92,10 +95,13 @@ def resolve_quickly(
             poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
             twists[t], A[first:stop], b[first:stop], e[first:stop],
         )  # fmt: skip
+        for i in range(first, stop):
+            correction[i] = gains[t] * e[i]
+        square, near[t] = threshold_compiled(square, correction[first:stop], damping_time)
     # limits -> box; regimes of the law within it, blended
     box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
     solve_regimes(
-        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
+        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], near, x, info,
         blend,
     )  # fmt: skip
     # checked: finite, sane, inside the box
