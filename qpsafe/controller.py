@@ -225,7 +225,8 @@ class SafetyController:
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self.activation.at(cdf_n)
         commanded = RobotState(self.robot, self._q)
-        if self._seq % self._stall.every == 0 or self._stall.held:
+        stall = self._stall
+        if self._seq % stall.every == 0 or stall.held:
             self._look(seen, commanded, activations)
         samples = self.recovery.update(cdf_n, commanded, activations)
         tasks, active, law, way = self.tasks, activations, self.law, self.recovery.way
@@ -251,13 +252,13 @@ class SafetyController:
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self.rules.speed_cap, resolved.box)
 
-        if self._stall.held:
+        if stall.held:
             command = self._braked()
 
         # integrate -> joint reference, now that nothing of the user's can fail any more
         path_time = self.recovery.path_time
         off_path = None if self.recovery.on_path else partial(_errors, self.tasks, commanded, path_time)
-        messages = (*self._stall.messages, *messages, *seen.notes)
+        messages = (*stall.messages, *messages, *seen.notes)
         return Tick(
             reference=self._advance(command),
             cdf_n=cdf_n,
@@ -308,7 +309,7 @@ class SafetyController:
         return self._qd - np.clip(self._qd, -most, most)
 
     def _look(self, seen: Sensed, commanded: RobotState, activations: tuple[float, ...]) -> None:
-        """See whether the robot does not get on, with nothing to explain it, and find another way back if it is lost."""
+        """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be."""
         stall, recovery = self._stall, self.recovery
         explained = seen.capped or not min(activations) >= 1.0 or (self.barrier and len(seen.points) > 0)
         explained = explained or recovery.way is not None

@@ -139,9 +139,8 @@ class Resolver:
         self._gains = np.empty(len(tasks))
         self._layout = layout_for(robot.nq, counts)
         n, rows, kinds = robot.nq, sum(counts), len(tasks) + 1
-        self._corrections = np.empty(rows)  # K e
-        self._weights, self._near = np.empty(kinds), np.zeros(kinds)  # damping of each level; the closing one has none
-        self._floats = rows * n + 2 * rows + (3 + kinds) * n  # of `parts`
+        self._weights = np.empty(kinds)
+        self._floats = rows * n + 2 * rows + (3 + kinds) * n + kinds  # of `parts`, and scratch
         self._integers = 3 * n + kinds * (HEADER + 2 * n + rows)
 
     @staticmethod
@@ -181,7 +180,7 @@ class Resolver:
         command, floats, integers = np.empty(len(qd)), np.zeros(self._floats), np.zeros(self._integers, dtype=np.int64)
         excess, worst = resolve_quickly(
             state.q, qd, state.memory, *self._tables, gains, goals, twists, qd0, weights, self._law.damping,
-            self._law.damping_time, self._near, self._corrections, *self._layout, floats, integers, command,
+            self._law.damping_time, *self._layout, floats, integers, command,
         )  # fmt: skip
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")

@@ -72,7 +72,7 @@ _any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
 @entry(
     types.UniTuple(types.float64, 2)(
         _any, _any, _one, _two, types.int64, _ints, _three, _ints, readable(2), types.float64, types.float64,
-        _one, readable(3), readable(2), _one, _one, types.float64, types.float64, types.float64[::1], types.float64[::1],
+        _one, readable(3), readable(2), _one, _one, types.float64, types.float64,
         types.float64[::1], types.int64[::1], types.int64, types.float64[:, ::1], types.float64[::1], types.int64[::1],
         _ints, types.float64[::1], types.int64[::1], types.float64[::1],
     ),
@@ -81,13 +81,14 @@ _any, _ints = readable(1), types.Array(types.int64, 1, "C", readonly=True)
 def resolve_quickly(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
     limits: Array, dt: float, return_speed: float, gains: Array, goals: Array, twists: Array, qd0: Array,
-    weights: Array, damping: float, damping_time: float, near: Array, correction: Array, work: Array, int_work: Index, m: int,
-    matrix: Array, target: Array, last: Index, ends: Index, floats: Array, integers: Index, command: Array,
+    weights: Array, damping: float, damping_time: float, work: Array, int_work: Index, m: int, matrix: Array,
+    target: Array, last: Index, ends: Index, floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill floats and integers (zeros; see `Parts`), command; returns excess, -1 if q̇ is absurd, and the worst code."""
     A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, q.shape[0], rows.shape[0], weights.shape[0])
     poses, axes, _, _ = cut(memory, q.shape[0], k)
-    square = damping * damping
+    # damping of each level, after the results; the closing one has none
+    near, square = view(floats, floats.shape[0] - weights.shape[0], (weights.shape[0],)), damping * damping
     # CLIK: ẋ = ẋ_d + K e
     for t in range(bodies.shape[0]):
         first, stop = (ends[t - 1] if t > 0 else 0), ends[t]
@@ -95,9 +96,7 @@ def resolve_quickly(
             poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
             twists[t], A[first:stop], b[first:stop], e[first:stop],
         )  # fmt: skip
-        for i in range(first, stop):
-            correction[i] = gains[t] * e[i]
-        square, near[t] = threshold_compiled(square, correction[first:stop], damping_time)
+        square, near[t] = threshold_compiled(square, gains[t], e[first:stop], damping_time)
     # limits -> box; regimes of the law within it, blended
     box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
     solve_regimes(

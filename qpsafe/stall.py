@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from qpsafe.tasks.task import Task
 
 PERIOD = 0.2  # [s] between two looks
-_LESS = 0.98  # an error that has shrunk to this share has shrunk
+_LESS = 0.95  # an error that has shrunk to this share has shrunk
 _NOTHING = 1e-6  # [m or rad] errors below need not shrink
 _BEHIND = 100.0  # tolerances that an error with a moving reference may grow to
 _AT_LIMIT = 1e-3  # [rad] from a position limit
@@ -44,7 +44,7 @@ class StallWatch:
     def reset(self) -> None:
         """Forget everything."""
         self._tasks: Sequence[Task] = ()
-        #: Commanded joint position (n,) when all tasks were last met, None if they were not yet.
+        #: Commanded joint position (n,) when all tasks, be they others, were last met; None if they never were.
         self.met: NDArray[np.float64] | None = None
         self.clear()
 
@@ -81,8 +81,8 @@ class StallWatch:
             calm: Whether nothing but tasks moves the robot.
         """
         if tasks is not self._tasks:
-            self.reset()
             self._tasks = tasks
+            self.clear()
         samples = [task.trajectory.sample(time) for task in tasks]
         values = [task.value(state) for task in tasks]
         found = [task.error(*pair) for task, *pair in zip(tasks, values, samples, strict=True)]
@@ -103,9 +103,10 @@ class StallWatch:
             return
         if self._idle == 0:
             self._best = np.full(len(tasks), np.inf)
-        if ((errors < _LESS * self._best) & (self._best > _NOTHING)).any():
+        less = (errors < _LESS * self._best) & (self._best > _NOTHING)
+        if (less & off).any() if any(off) else less.any():  # others' errors do not excuse those that are off
             self._idle, self.messages, self.held, self.stalled = 0, (), False, False
-            self._best = np.where(errors < _LESS * self._best, errors, self._best)
+        self._best = np.where(less, errors, self._best)
         self._idle += 1
         if self._idle <= self._looks:
             return

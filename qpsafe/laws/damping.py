@@ -24,17 +24,18 @@ DAMPING_TIME = 0.04
 _HUGE = 1e60
 
 
-def threshold(square: float, correction: Array, time: float) -> tuple[float, float]:
+def threshold(square: float, gain: float, error: Array, time: float) -> tuple[float, float]:
     """ε² and ε below which singular values of a task are damped; ε = 0 where that is not finite.
 
     Args:
         square: ε² of the task above; floor² for the first one.
-        correction: K e (rows,) [m/s, rad/s].
+        gain: K [1/s]; 1 where `error` is K e already.
+        error: e (rows,) [m, rad].
         time: μ [s].
     """
     total = 0.0
-    for i in range(correction.shape[0]):
-        total += correction[i] * correction[i]
+    for i in range(error.shape[0]):
+        total += (gain * error[i]) * (gain * error[i])
     square += time * sqrt(total)
     return square, sqrt(square) if square < _HUGE else 0.0
 

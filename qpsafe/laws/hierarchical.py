@@ -108,7 +108,7 @@ class HierarchicalLaw:
         damping, square = [0.0] * len(levels), self.damping**2
         for k in range(len(tasks)):
             correction = problem.corrections[k] if problem.corrections else _NONE
-            square, damping[len(problem.soft) + k] = threshold(square, correction, self.damping_time)
+            square, damping[len(problem.soft) + k] = threshold(square, 1.0, correction, self.damping_time)
         return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=damping)
 
 
