@@ -30,6 +30,12 @@ class Braked(NamedTuple):
     messages: tuple[str, ...]
 
 
+def slower(limits: JointLimits, qd: Array) -> Array:
+    """The velocity qd (n,) [rad/s] a tick later, braked as hard as allowed: inside the box."""
+    most = limits.max_acceleration * limits.dt
+    return qd - np.clip(qd, -most, most)
+
+
 def brake(limits: JointLimits, evasion: Evasion, q: Array, qd: Array) -> Braked:
     """Brake with the largest acceleration; never raises, whatever the evasion is.
 
@@ -38,11 +44,10 @@ def brake(limits: JointLimits, evasion: Evasion, q: Array, qd: Array) -> Braked:
         evasion: The admittance.
         q, qd: Commanded position and velocity (n,) [rad, rad/s].
     """
-    none, most = np.zeros(len(q)), limits.max_acceleration * limits.dt
-    slower = qd - np.clip(qd, -most, most)  # inside the box, whose speeds can all be braked
+    none = np.zeros(len(q))
     messages: tuple[str, ...] = ()
     try:
         qd0 = np.array(evasion.step(none))  # no danger is known: what was known fades
     except Exception as error:  # an evasion of another making
         qd0, messages = none, (in_words(error),)
-    return Braked(slower, limits.box(q, qd), qd0, messages)
+    return Braked(slower(limits, qd), limits.box(q, qd), qd0, messages)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.braking import brake
+from qpsafe.braking import brake, slower
 from qpsafe.checks import (
     check_command,
     check_tasks,
@@ -27,7 +27,9 @@ from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.errors import in_words
 from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.problem import Law
+from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.limits import JointLimits
 from qpsafe.parts import Parts
 from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
@@ -35,7 +37,7 @@ from qpsafe.reference import JointReference
 from qpsafe.resolve import Resolve, Resolved, judged
 from qpsafe.returns import GentleLimits
 from qpsafe.robot.state import RobotState
-from qpsafe.sense import Sense
+from qpsafe.sense import Seen, Sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -43,6 +45,7 @@ from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
 from qpsafe.speed_cap import slowed
+from qpsafe.stall import StallWatch
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
@@ -51,6 +54,9 @@ if TYPE_CHECKING:
 
 #: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint, tuned on the first experiment.
 DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
+_CALM = 0.01  # [rad/s] evasive velocity that does not explain motion
+_BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep from what nobody else knows
+_WAY_LAW = HierarchicalLaw()
 
 
 class SafetyController(Parts):
@@ -124,6 +130,8 @@ class SafetyController(Parts):
         if self._sensing is not None:
             self._sensing.reset()
         self._units.reset()
+        rules = self._recovery_rules
+        self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)
         self._seq = -1
         self._active = False
         self._q = self._robot.home
@@ -218,7 +226,13 @@ class SafetyController(Parts):
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self._activation.at(cdf_n)
         commanded = RobotState(self._robot, self._q)
+        stall = self._stall
+        if self._seq % stall.every == 0 or stall.held:
+            self._look(seen, commanded, activations)
         samples = recovery.update(cdf_n, commanded, activations)
+        tasks, active, law = self._tasks, activations, self._law
+        if recovery.way is not None:  # back through the joints
+            tasks, active, law = recovery.way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         limits = self._limits
@@ -226,9 +240,9 @@ class SafetyController(Parts):
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         measured = None if barrier is None else self._robot.at(as_joint_position(q, self._robot))
         level = barrier and barrier.level(measured, self._qd, seen.points, seen.danger)
-        resolved = self._current_resolve()(
-            commanded, self._qd, self._acceleration, samples, qd0, activations, limits, (level,) if level else ()
-        )
+        soft = (level,) if level else ()
+        resolve = self._current_resolve(tasks, law)
+        resolved = resolve(commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
         command = resolved.command
         if barrier is not None:  # exact, as far as the acceleration limits allow
             command = barrier.scale(measured, command, seen.points).factor * command
@@ -238,7 +252,9 @@ class SafetyController(Parts):
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
-        messages = (*messages, *seen.notes, *self._units.notes(distances, points))
+        if stall.held:
+            command = slower(self._braking, self._qd)
+        messages = (*stall.messages, *messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
             cdf_n=cdf_n,
@@ -268,11 +284,11 @@ class SafetyController(Parts):
             self._sense = Sense(self._robot, self._sensing, self._field, self._evasion)
         return self._sense
 
-    def _current_resolve(self) -> Resolve:
+    def _current_resolve(self, tasks: Sequence[Task], law: Law) -> Resolve:
         """The second half of a tick with the present parts."""
-        tasks, law = self._resolve.parts
-        if not (tasks is self._tasks and law is self._law):
-            self._resolve = Resolve(self._robot, self._tasks, self._law, self._dt)
+        made = self._resolve.parts
+        if not (made[0] is tasks and made[1] is law):
+            self._resolve = Resolve(self._robot, tasks, law, self._dt)
         return self._resolve
 
     @property
@@ -298,6 +314,20 @@ class SafetyController(Parts):
             joint_names=self._robot.joint_names,
             resolved=Resolved(braked.command, 0.0, False, braked.box),
         )
+
+    def _look(self, seen: Seen, commanded: RobotState, activations: tuple[float, ...]) -> None:
+        """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be."""
+        stall, recovery = self._stall, self._recovery
+        explained = seen.capped or not min(activations) >= 1.0 or (self._barrier is not None and len(seen.points) > 0)
+        explained = explained or recovery.way is not None
+        if explained and stall.held:
+            stall.clear()
+        if self._seq % stall.every == 0:
+            bundled = isinstance(self._law, _BUNDLED)
+            calm = bundled and float(np.abs(seen.qd0).max()) < _CALM
+            stall.look(self._tasks, commanded, self._qd, recovery.path_time, explained, calm)
+            if stall.stalled and stall.met is not None and bundled and recovery.lead(stall.met):
+                stall.clear()
 
     def _reference(self, command: NDArray[np.float64]) -> JointReference:
         """Where a command (n,) [rad/s] leads; its arrays are nobody else's."""

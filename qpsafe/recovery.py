@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.returns import RecoveryRules, Return, minimum_jerk, run_out
+from qpsafe.tasks.joint import JointTask
+from qpsafe.tasks.trajectory import FixedJoints
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
@@ -52,7 +54,9 @@ class Recovery:
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
         self.waits_for: tuple[str, ...] = ()
         self._rate = 1.0  # of the clock
-        self._changed = False
+        self._changed = self._led = False
+        #: The way back through the joints, while it is taken.
+        self.way: Recovery | None = None
         self._cursors: list[_Cursor] = []
         self._passed: set[tuple[float, str]] = set()  # events at the very time where the clock stands
         self._due: tuple[list[tuple[_Cursor, int]], set[tuple[float, str]]] | None = None  # found, not passed yet
@@ -78,6 +82,7 @@ class Recovery:
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks = tuple(tasks)
         self.suspend_above = suspend_above
+        self.way = None
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
@@ -97,13 +102,16 @@ class Recovery:
     @property
     def clocks(self) -> tuple:
         """Phase, times on the path and on the returns; set them back when the robot could not go along."""
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self.phase
+        way = None if self.way is None else self.way.clocks
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self.phase, way
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
         self.path_time, self._rate = clocks[:2]
         self._returns, self._pending, self.phase = list(clocks[2]), list(clocks[3]), clocks[4]
         self._due = None
+        if self.way is not None and clocks[5] is not None:
+            self.way.clocks = clocks[5]
 
     def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
         """Advance one tick and give each task its reference.
@@ -126,6 +134,11 @@ class Recovery:
             samples = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
             self._last = [(state, sample) for sample in samples]  # only the last tick's will be of interest
             return tuple(samples)
+        if self.way is not None:
+            samples = self.way.update(cdf_n, state, (min(activations),))
+            if self.way.phase != FOLLOWING:
+                return samples
+            self.way = None  # there: what is left is the way from a posture that met the tasks
         return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
 
     @property
@@ -173,8 +186,28 @@ class Recovery:
         else:
             self._advance(state)
 
+    def lead(self, posture: NDArray[np.float64]) -> bool:
+        """Return through the joints, straight to a posture (n,) [rad], and from there to the path.
+
+        The way for a robot that is recovering and does not get on: joint limits that block the straight way of a pose
+        never block that of the joints. It is taken once between two dangers.
+
+        Returns:
+            Whether it goes there now; `way` then has the task and, at every tick, its reference.
+        """
+        if self.phase != RECOVERING or self._led or not self.rules.enabled:
+            return False
+        task = JointTask(FixedJoints(posture))
+        self._led, self.way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
+        self.way.set_tasks([task], self.suspend_above, restart=False)
+        self._returns = [None] * len(self.tasks)
+        self._pending = [True] * len(self.tasks)
+        self._offsets = [None] * len(self.tasks)
+        return True
+
     def _suspend(self) -> None:
         self.phase, self._rate = SUSPENDED, 0.0
+        self.way, self._led = None, False
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
 

@@ -106,8 +106,10 @@ class Resolve:
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
         own = type(law) is HierarchicalLaw and law.solver in (None, "own")
         self._ours = own and (law.projection == "strict" or len(tasks) == 1)  # type: ignore[attr-defined]
-        self._block = np.zeros(24 * len(tasks) + 1 + robot.nq)
-        self._gains, self._goals, self._twists, self._weights, self._qd0 = given(self._block, robot.nq, len(tasks))
+        self._block = np.zeros(26 * len(tasks) + 2 + robot.nq)
+        cut = given(self._block, robot.nq, len(tasks))
+        self._gains, self._standing, self._goals, self._twists, self._weights, _, self._qd0 = cut
+        self._gains[:] = [task.gain for task in tasks]
         nowhere = (0, np.eye(4))
         mountings = [
             robot.mounting(task.frame) if isinstance(task, PoseTask) and rows is not None else nowhere
@@ -150,10 +152,11 @@ class Resolve:
         ours = self._ours and limits is not None and not soft
         self._weights[:] = weights = weights_of(activations)
         self._qd0[:] = qd0
-        damping = self.parts[1].damping if ours else np.nan
+        law = self.parts[1]
+        damping = (law.damping, law.damping_time) if ours else (np.nan, np.nan)  # type: ignore[attr-defined]
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
-            table, self._dt, return_speed, damping, *layout, floats, integers, command,
+            table, self._dt, return_speed, *damping, *layout, floats, integers, command,
         )  # fmt: skip
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
@@ -177,10 +180,10 @@ class Resolve:
                     and pose.shape == (4, 4)
                     and twist.shape == (6,)
                 ):
-                    self._goals[k], self._twists[k], self._gains[k] = pose, twist, task.gain
+                    self._goals[k], self._twists[k], self._standing[k] = pose, twist, 0.0
                     counts.append(len(rows))
                     continue
-            self._gains[k] = np.nan
+            self._standing[k] = 1.0
             asked[k] = task.clik(state, sample)
             counts.append(len(asked[k].velocity))
         return tuple(counts), asked
@@ -213,8 +216,9 @@ class Resolve:
         cut, (_, _, qd0, _, counts, _, limited) = made._parts, made._frozen  # type: ignore[misc]
         pairs = list(pairwise([0, *accumulate(counts)]))
         wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
+        corrections = tuple([task.gain * cut.e[a:b] for task, (a, b) in zip(self.parts[0], pairs, strict=True)])
         lower, upper = cut.bounds.copy() if limited else (None, None)
-        result = self.parts[1].solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft))
+        result = self.parts[1].solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft, corrections))
         answer = checked_velocity(result, state.q, self._dt)
         command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
         check_command(command, self._dt)

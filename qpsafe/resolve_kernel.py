@@ -19,6 +19,8 @@ from qpsafe.hqp import own_regimes
 from qpsafe.hqp.own_hierarchy import HEADER
 from qpsafe.hqp.own_regimes import solve_regimes
 from qpsafe.hqp.own_solver import MODULES
+from qpsafe.laws import damping as laws_damping
+from qpsafe.laws.damping import threshold_compiled
 from qpsafe.limits import admit_into, box_into
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
@@ -73,14 +75,17 @@ def sizes_of(n: int, rows: int, kinds: int) -> tuple[int, int]:
 
 
 def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
-    """Cut from a block what changes every tick: gains (tasks,), NaN where the rows stand already; goals (tasks, 4, 4);
-    twists (tasks, 6); weights of the regimes (tasks + 1,); q̇0 (n,)."""
+    """Cut from a block what changes every tick: gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals
+    (tasks, 4, 4); twists (tasks, 6); weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in
+    by the call; q̇0 (n,)."""
     return (
         view(block, 0, (tasks,)),
-        view(block, tasks, (tasks, 4, 4)),
-        view(block, 17 * tasks, (tasks, 6)),
-        view(block, 23 * tasks, (tasks + 1,)),
-        view(block, 24 * tasks + 1, (n,)),
+        view(block, tasks, (tasks,)),
+        view(block, 2 * tasks, (tasks, 4, 4)),
+        view(block, 18 * tasks, (tasks, 6)),
+        view(block, 24 * tasks, (tasks + 1,)),
+        view(block, 25 * tasks + 1, (tasks + 1,)),
+        view(block, 26 * tasks + 2, (n,)),
     )
 
 
@@ -92,14 +97,15 @@ _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.
 @entry(
     types.UniTuple(types.float64, 2)(
         _any, _any, _one, _two, types.int64, _ints, _three, _ints, types.float64[::1], readable(2), types.float64,
-        types.float64, types.float64,
+        types.float64, types.float64, types.float64,
         _out, _out_ints, types.int64, types.float64[:, ::1], _out, _out_ints, _ints, _out, _out_ints, _out,
     ),
-    kinematics, clik, limits_module, own_regimes, *MODULES,
+    kinematics, clik, limits_module, laws_damping, own_regimes, *MODULES,
 )  # fmt: skip
 def resolve_tick(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
     block: Array, limits: Array, dt: float, return_speed: float, damping: float,
+    damping_time: float,
     work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index,
     floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
@@ -113,7 +119,7 @@ def resolve_tick(
         block: What `given` cuts.
         limits: Lower, upper, velocity, acceleration (4, n), or (0, n) where the box stands already.
         dt, return_speed: Of the limits.
-        damping: Of the law; NaN where the law is of another making and will be asked afterwards.
+        damping, damping_time: Of the law; NaN where it is of another making and will be asked afterwards.
         work, int_work, m, matrix, target, last, ends: A `Layout` of the solver.
         floats, integers: Results, zeros but for what stands already.
         command: (n,), q̇ inside the box.
@@ -123,23 +129,26 @@ def resolve_tick(
     """  # fmt: skip
     n, tasks = q.shape[0], bodies.shape[0]
     A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, n, rows.shape[0], tasks + 1)
-    gains, goals, twists, weights, qd0 = _given(block, n, tasks)
+    gains, standing, goals, twists, weights, near, qd0 = _given(block, n, tasks)
     poses, axes, _, _ = cut(memory, n, k)
+    square = damping * damping
     # CLIK: ẋ = ẋ_d + K e
     for t in range(tasks):
         first, stop = (ends[t - 1] if t > 0 else 0), ends[t]
-        if gains[t] == gains[t]:
+        if standing[t] == 0.0:
             pose_rows(
                 poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
                 twists[t], A[first:stop], b[first:stop], e[first:stop],
             )  # fmt: skip
+        square, near[t] = threshold_compiled(square, gains[t], e[first:stop], damping_time)
+    near[tasks] = 0.0  # the level that closes the hierarchy has none
     if limits.shape[0] > 0:
         box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
     if damping != damping:
         return 0.0, 0.0
     # regimes of the law within the box, blended
     solve_regimes(
-        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], damping, x, info,
+        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], near, x, info,
         blend,
     )  # fmt: skip
     # checked: finite, sane, inside the box

@@ -27,6 +27,8 @@ class RecoveryRules:
             where a joint could not stop before its position limit else.
         tolerance: Largest error norm at which a task counts as met [m or rad].
         ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
+        patience: Time [s] after which a robot that stands off its goals, or moves without getting nearer, though no
+            danger and no motion of the goals explains it, says so, and is led back through its joints or held.
         enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
 
     Raises:
@@ -41,6 +43,7 @@ class RecoveryRules:
     acceleration: float = 0.5
     tolerance: float = 5e-4
     ramp: float = 0.2
+    patience: float = 2.0
     enabled: bool = True
 
     def __post_init__(self) -> None:

@@ -116,7 +116,8 @@ def law_settings(law: Law | None) -> dict[str, Any] | None:
     if law is None:
         return None
     if isinstance(law, HierarchicalLaw):
-        return {"name": "hierarchical", "projection": law.projection, "solver": law.solver, "damping": law.damping}
+        keys = "projection", "solver", "damping", "damping_time"
+        return {"name": "hierarchical", **{key: getattr(law, key) for key in keys}}
     if isinstance(law, NullspaceLaw):
         return {"name": "nullspace"}
     if isinstance(law, WeightedLaw):
@@ -129,7 +130,8 @@ def law_of(settings: Mapping[str, Any] | None) -> Law | None:
     if settings is None:
         return None
     if settings["name"] == "hierarchical":
-        return HierarchicalLaw(settings["projection"], solver=settings["solver"], damping=settings["damping"])
+        dampings = settings["damping"], settings.get("damping_time", 0.0)  # older runs knew one of them
+        return HierarchicalLaw(settings["projection"], settings["solver"], *dampings)
     if settings["name"] == "weighted":
         return WeightedLaw(settings["ratio"], solver=settings["solver"])
     if settings["name"] == "nullspace":

@@ -20,9 +20,20 @@ from __future__ import annotations
 from math import sqrt
 
 from qpsafe.danger.compiled import inline
+from qpsafe.hqp.own_linear import Array
 from qpsafe.hqp.own_state import State
 
-OFF, WITHOUT, WITH = 0, 1, 2  # what to do with nearly singular directions
+WITHOUT, WITH = 1, 2  # what to do with nearly singular directions
+
+
+@inline
+def nearly_singular(diagonal: Array, rank: int, damping: float) -> bool:
+    """Whether a singular value may be below `damping`, by the diagonal of `factorise`: false alarms only.
+
+    Pivoting makes |d_r| the least of the diagonal, and σ_r >= 3 |d_r| / sqrt(4^r + 6 r - 1) (Faddeev et al.; Higham,
+    "Accuracy and Stability of Numerical Algorithms", theorem 8.14).
+    """
+    return 9.0 * diagonal[rank - 1] ** 2 < (4.0**rank + 6.0 * rank - 1.0) * damping * damping
 
 
 @inline

@@ -24,7 +24,7 @@ import numpy as np
 
 from qpsafe.danger.compiled import inline
 from qpsafe.danger.reference import by_reference
-from qpsafe.hqp.own_damping import OFF, WITH, WITHOUT
+from qpsafe.hqp.own_damping import WITH, WITHOUT
 from qpsafe.hqp.own_level import minimise_level
 from qpsafe.hqp.own_linear import Array, Index, dot
 from qpsafe.hqp.own_state import ABSENT, LOCKED, State, cut, load_box, load_rows
@@ -48,7 +48,7 @@ def run(
     box_low: Array,
     box_high: Array,
     hard: bool,
-    damping: float,
+    damping: Array,
 ) -> None:
     """Solve one hierarchy.
 
@@ -67,7 +67,7 @@ def run(
         box_low: (n,) lower limits.
         box_high: (n,) upper limits.
         hard: whether the first level are hard rows.
-        damping: singular values below it are damped, see `own_damping`; 0 for none.
+        damping: (levels,) singular values below it are damped, see `own_damping`; 0 for none.
     """
     n, rows, levels = box_low.shape[0], rows_A.shape[0], ends.shape[0]
     s = by_reference(cut(floats, integers, x, rows + 2 * n, m + n))
@@ -92,8 +92,8 @@ def run(
         for level in range(levels + 1):
             last = ends[level] if level < levels else rows + n
             if last > first and start < n:
-                how = mode if damping > 0.0 else OFF
-                start, turns = minimise_level(s, level, first, last, start, limit, how, damping)
+                near = damping[level] if level < levels else 0.0
+                start, turns = minimise_level(s, level, first, last, start, limit, mode, near)
                 info[1] += turns
                 if start < 0:
                     info[0], info[2] = TURNS, level

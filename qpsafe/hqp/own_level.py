@@ -23,7 +23,7 @@ from math import sqrt
 import numpy as np
 
 from qpsafe.danger.compiled import inline
-from qpsafe.hqp.own_damping import OFF, damp
+from qpsafe.hqp.own_damping import damp, nearly_singular
 from qpsafe.hqp.own_linear import along, dot, factorise, image, least_squares, reflect, unturn
 from qpsafe.hqp.own_rules import multipliers, ratio_test, wrong_way
 from qpsafe.hqp.own_state import FREE, LOCKED, State, hold, release
@@ -127,8 +127,8 @@ def minimise_level(
         last: one past its last row.
         start: basis vectors already used.
         limit: turns allowed.
-        mode: OFF, or what to do with singular values below `damping`, see `own_damping`.
-        damping: the ε of `own_damping`.
+        mode: what to do with singular values below `damping`, see `own_damping`.
+        damping: the ε of `own_damping`; 0 for none.
 
     Returns:
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
@@ -149,9 +149,7 @@ def minimise_level(
                 G[j, n + a] = image(G, j, A, first + a)
 
     tolerance = RANK * norm
-    if mode != OFF and inequalities == 0 and not uniform:
-        count = damp(s, mode, first, count, start, damping, tolerance)
-        width = n + m + n
+    undamped = damping > 0.0 and inequalities == 0 and not uniform
     rank, size, pivot = 0, 0.0, 1.0
     w, turn = np.int64(0), np.int64(0)
     while True:
@@ -167,6 +165,11 @@ def minimise_level(
                 u[j] = along(G, base + j, r, n) / scale
         else:
             rank = load_factor(s, start, w, count, tolerance)
+            if undamped and rank > 0 and nearly_singular(s.diagonal, rank, damping):
+                count = damp(s, mode, first, count, start, damping, tolerance)
+                width = n + m + n
+                rank = load_factor(s, start, w, count, tolerance)
+            undamped = False
             residuals(s, first, last, count)  # after the pivoting, which permutes the rows
             least_squares(s.F, count, rank, s.diagonal, r, u)
             unturn(s.F, s.tau, rank, n - base, u)

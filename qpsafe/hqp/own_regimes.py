@@ -28,7 +28,7 @@ _count_floats = inline(floats_of)
 @inline
 def solve_regimes(
     floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index, A: Array, b: Array,
-    weights: Array, qd0: Array, lower: Array, upper: Array, damping: float, x: Array, info: Index, qd: Array,
+    weights: Array, qd0: Array, lower: Array, upper: Array, damping: Array, x: Array, info: Index, qd: Array,
 ) -> None:  # fmt: skip
     """Solve every regime with weight, for compiled code.
 
@@ -40,7 +40,7 @@ def solve_regimes(
         qd0: (n,) evasive velocity.
         lower: (n,) lower limits.
         upper: (n,) upper limits.
-        damping: As in `solve_hierarchy`.
+        damping: (tasks + 1,) of each level, as in `solve_hierarchy`; the last one is 0.
         x: (tasks + 1, n) zeros; becomes q̇ of each regime.
         info: (tasks + 1, 3 + 2 n + rows) zeros; becomes what `own_hierarchy.run` says of each.
         qd: (n,) zeros; becomes the blend.
@@ -63,7 +63,7 @@ def solve_regimes(
         solve(
             view(floats, 0, (_count_floats(n, rows, m),)), integers, m, x[kept],
             view(info, kept * info.shape[1], (HEADER + n + rows,)), view(matrix, 0, (rows, n)), known, known,
-            view(target, 0, (0,)), view(last, 0, (kept + 1,)), lower, upper, False, damping,
+            view(target, 0, (0,)), view(last, 0, (kept + 1,)), lower, upper, False, view(damping, 0, (kept + 1,)),
         )  # fmt: skip
         for j in range(n):
             qd[j] += weights[kept] * x[kept, j]

@@ -27,7 +27,7 @@ def read(dimensions: int) -> Any:
 _SIGNATURE = types.void(
     types.float64[::1], types.int64[::1], types.int64, types.float64[::1], types.int64[::1],
     read(2), read(1), read(1), read(1), read(1).copy(dtype=types.int64), read(1), read(1),
-    types.boolean, types.float64,
+    types.boolean, read(1),
 )  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def solve_packed(
     box_low: Array,
     box_high: Array,
     hard: bool,
-    damping: float = 0.0,
+    damping: Array | None = None,
 ) -> tuple[Array, Index]:
     """Solve levels of `counts` rows each, packed one below the other.
 
@@ -72,7 +72,7 @@ def solve_packed(
         box_low: (n,) lower limits.
         box_high: (n,) upper limits.
         hard: whether the first level are hard rows.
-        damping: singular values below it are damped; 0 for none.
+        damping: (levels,) singular values below it are damped; None for none.
 
     Returns:
         q̇ (n,), and `info` of [`own_hierarchy.run`][qpsafe.hqp.own_hierarchy.run].
@@ -82,5 +82,6 @@ def solve_packed(
     x = np.zeros(n)
     info = np.zeros(HEADER + n + A.shape[0], np.int64)
     weights = _NO_WEIGHTS if weight is None else weight
-    solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, damping)
+    near = np.zeros(len(counts)) if damping is None else damping
+    solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, near)
     return x, info

@@ -26,6 +26,7 @@ from qpsafe.hqp.solution import (
 
 Array = NDArray[np.float64]
 
+_FLOAT = np.dtype(np.float64)
 STATUS = (
     SOLVED,
     ROWS_INFEASIBLE,
@@ -47,7 +48,7 @@ def solve_hierarchy(
     solver: str | None = None,
     *,
     rows: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
-    damping: float = 0.0,
+    damping: float | Sequence[float] = 0.0,
 ) -> Solution:
     """Solve prioritised least squares: each level is minimised among the optima of those before it.
 
@@ -64,7 +65,7 @@ def solve_hierarchy(
         rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
         damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
             A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
-            nothing. 0 means none. Own solver only.
+            nothing. One number, or one a level; 0 means none. Own solver only.
 
     Returns:
         The solution. "solved" means optimal at every level to rounding, in any units of levels and hard rows; where
@@ -77,16 +78,28 @@ def solve_hierarchy(
     """
     begin = perf_counter()
     problem = pack(levels, lower, upper, rows)
-    if not 0.0 <= damping < np.inf:
-        raise ConfigurationError("solve_hierarchy", "damping", damping, "a number >= 0, in the unit of A")
+    near = _damping(damping, len(problem.counts) - problem.hard, problem.hard)
     if solver is None or solver == "own":
-        return _own(problem, begin, damping)
-    if damping > 0.0:
+        return _own(problem, begin, near)
+    if near is not None:
         raise ConfigurationError("solve_hierarchy", "damping", damping, f'0 with solver {solver!r}; only "own" damps')
     return _by_back_end(problem, solver, begin)
 
 
-def _own(problem: Packed, begin: float, damping: float = 0.0, note: str = "") -> Solution:
+def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array | None:
+    """ε of every level, hard rows first, which have none; None if all are 0."""
+    values = np.array(damping, _FLOAT)
+    if values.shape not in ((), (levels,)) or not np.all((values >= 0.0) & (values < np.inf)):
+        expected = f"a number >= 0, or one for each of {levels} levels, in the unit of A"
+        raise ConfigurationError("solve_hierarchy", "damping", damping, expected)
+    if not values.any():
+        return None
+    near = np.zeros(levels + hard)
+    near[int(hard) :] = values
+    return near
+
+
+def _own(problem: Packed, begin: float, damping: Array | None = None, note: str = "") -> Solution:
     """Solve with the own solver."""
     global _solve_packed
     if _solve_packed is None:  # the first use: it brings numba

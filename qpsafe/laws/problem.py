@@ -35,6 +35,7 @@ class LawProblem(NamedTuple):
         lower: Lowest admissible q̇ (n,), or None without limits.
         upper: Highest admissible q̇ (n,), or None without limits.
         soft: Inequality levels (barriers) directly under the limits, before the first task; by default none.
+        corrections: The part K e of each task's velocity that corrects its error, (rows,) each; by default nothing.
     """
 
     tasks: tuple[TaskVelocity, ...]
@@ -43,6 +44,7 @@ class LawProblem(NamedTuple):
     lower: NDArray[np.float64] | None = None
     upper: NDArray[np.float64] | None = None
     soft: tuple[Level, ...] = ()
+    corrections: tuple[NDArray[np.float64], ...] = ()
 
 
 @dataclass(frozen=True)

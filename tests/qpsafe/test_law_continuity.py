@@ -74,3 +74,44 @@ def test_damping_never_reaches_the_task_above() -> None:
 def test_wrong_damping_is_refused(setting: dict) -> None:
     with pytest.raises(qpsafe.ConfigurationError, match="damping"):
         qpsafe.HierarchicalLaw(**setting)
+
+
+def _near_a_singular_wrist(angle: float, errors: float) -> LawProblem:
+    """Two tasks whose errors have this size, ẋ_d = 0, K = 1 and 10."""
+    q = ROBOT.home.copy()
+    q[4] = angle
+    J = ROBOT.jacobian("tcp", q)
+    corrections = errors * np.array([0.2, -0.1, 0.1]), 10.0 * errors * np.array([0.5, 0.3, -0.4])
+    tasks = TaskVelocity(J[:3], corrections[0]), TaskVelocity(J[3:], corrections[1])
+    return LawProblem(tasks, np.zeros(6), (1.0, 1.0), corrections=corrections)
+
+
+@pytest.mark.parametrize("errors", [1.0, 1e-1, 1e-2])
+def test_errors_are_corrected_at_bounded_gain_near_a_singular_pose(errors: float) -> None:
+    """dq̇/dq stays below some 1/μ whatever the errors, and grows without bound undamped."""
+    angles = np.linspace(-0.05, 0.05, 2001)
+
+    def steepest(law: qpsafe.HierarchicalLaw) -> float:
+        qd = np.array([law.solve(_near_a_singular_wrist(a, errors)).qd for a in angles])
+        return float(np.abs(np.diff(qd, axis=0)).max() / (angles[1] - angles[0]))
+
+    assert steepest(qpsafe.HierarchicalLaw()) < 3.0 / 0.04
+    assert steepest(qpsafe.HierarchicalLaw(damping_time=0.0)) > 100.0 / 0.04 * errors
+
+
+def test_damping_goes_with_the_errors() -> None:
+    """Tasks that are met, on the move or not, are never damped; neither is a law that is not told of errors."""
+    plain = qpsafe.HierarchicalLaw(damping_time=0.0)
+    for angle in (1e-6, 1e-3, 0.05):
+        problem = _near_a_singular_wrist(angle, 1.0)
+        for corrections in ((), (np.zeros(3), np.zeros(3))):
+            told = problem._replace(corrections=corrections)
+            assert np.array_equal(qpsafe.HierarchicalLaw().solve(told).qd, plain.solve(told).qd)
+
+
+@pytest.mark.parametrize("options", [{"projection": "paper"}, {"solver": "daqp"}])
+def test_what_has_to_be_equal_to_something_is_not_damped_by_default(options: dict) -> None:
+    assert qpsafe.HierarchicalLaw(**options).damping_time == 0.0
+    assert qpsafe.HierarchicalLaw().damping_time > 0.0
+    with pytest.raises(qpsafe.ConfigurationError, match="damping_time"):
+        qpsafe.HierarchicalLaw(damping_time=-1.0)

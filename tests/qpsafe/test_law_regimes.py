@@ -58,7 +58,8 @@ def one_by_one(
     box = None if limits is None else limits.box(state.q, qd, np.zeros(len(qd)))
     lower, upper = (None, None) if box is None else (box.lower, box.upper)
     wishes = tuple(TaskVelocity(clik.jacobian, clik.velocity) for clik in wanted)
-    result = law.solve(LawProblem(wishes, qd0, activations, lower, upper))
+    corrections = tuple(task.gain * clik.error for task, clik in zip(tasks, wanted, strict=True))
+    result = law.solve(LawProblem(wishes, qd0, activations, lower, upper, (), corrections))
     answer = checked_velocity(result, state.q, 0.004)
     command, excess = (answer, 0.0) if box is None else box.admit(answer)
     return Other(command, excess, result.status == "solved", box, result, tuple(clik.error for clik in wanted))
@@ -149,7 +150,8 @@ def test_built_in_parts_give_the_bits_of_the_law(
     wishes = tuple(TaskVelocity(clik.jacobian, clik.velocity) for clik in wanted)
     assert one.box is not None
     assert one.result is not None
-    other = law.solve(LawProblem(wishes, qd0, activations, one.box.lower, one.box.upper))
+    corrections = tuple(task.gain * clik.error for task, clik in zip(tasks, wanted, strict=True))
+    other = law.solve(LawProblem(wishes, qd0, activations, one.box.lower, one.box.upper, (), corrections))
     assert np.array_equal(one.result.qd, other.qd)
     assert np.array_equal(one.command, one.box.clip(other.qd))
     assert one.result.status == other.status
