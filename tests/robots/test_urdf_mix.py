@@ -13,6 +13,7 @@ import pytest
 from qpsafe.errors import RobotFileError
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
+from qpsafe.robot.starting_file import starting_robot_toml
 from qpsafe.sensing.body import body_hulls
 
 SEEDS = 100
@@ -97,3 +98,18 @@ def compare_hulls(robot: Robot, boxes: dict[str, list[np.ndarray]]) -> None:
                     break
             else:
                 raise AssertionError(f"no hull where {link} has a shape")
+
+
+@pytest.mark.parametrize("seed", [2, 5, 17, 31])  # 17: the wire ends at a joint that slides
+def test_a_starting_file_is_the_same_robot(seed: int, tmp_path: Path, urdf_writer: Any) -> None:
+    writer = urdf_writer(tmp_path, seed)
+    robot = load(writer.write(), hold=None if writer.mimic is None else {"axis0": 0.3, "level": -0.3})
+    (tmp_path / "robot.toml").write_text(starting_robot_toml(robot, tmp_path))
+    again = load(tmp_path)
+    assert (again.joint_names, again.frame_names) == (robot.joint_names, robot.frame_names)
+    assert again.wire_frames == robot.wire_frames
+    q = np.clip(np.random.default_rng(seed).uniform(-2.0, 2.0, robot.nq), robot.lower, robot.upper)
+    for frame in robot.frame_names:
+        np.testing.assert_allclose(again.pose(frame, q), robot.pose(frame, q), rtol=0, atol=1e-7)
+    for key in ("lower", "upper", "max_velocity", "max_acceleration", "home"):
+        np.testing.assert_allclose(getattr(again, key), getattr(robot, key), rtol=0, atol=1e-7)
