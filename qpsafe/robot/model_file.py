@@ -69,11 +69,11 @@ def read_bundled(path: Path) -> ModelFile:
     These files keep to what that reader understands; tests compare it with MuJoCo and with `read_model`.
     """
     model = pin.buildModelFromMJCF(str(path))
+    return ModelFile(model, hulls=partial(hulls_of_pinocchio, path, partial(_bundled_geometry, path, model)))
 
-    def geometry() -> Any:
-        return pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.COLLISION)
 
-    return ModelFile(model, hulls=partial(hulls_of_pinocchio, path, geometry))
+def _bundled_geometry(path: Path, model: Any) -> Any:
+    return pin.buildGeomFromMJCF(model, str(path), pin.GeometryType.COLLISION)
 
 
 def _parse(path: Path) -> Element:

@@ -56,7 +56,7 @@ def starting_robot_toml(robot: Robot, folder: Path) -> str:
     lines += ["]", ""]
     several = len(robot.tool_frames) > 1
     for frame in robot.tool_frames:
-        mount = next((start for start, end in robot.wire_frames if end == frame), frame)
+        mount = _mount(robot, frame)
         offset = _offset(robot, mount, frame)
         lines += [
             "# Assumed: the tool ends where the wire ends. Its mass is for people only.",
@@ -68,6 +68,13 @@ def starting_robot_toml(robot: Robot, folder: Path) -> str:
             "",
         ]
     return "\n".join(lines)
+
+
+def _mount(robot: Robot, frame: str) -> str:
+    """The frame that a wire's end keeps its distance from: where its link starts, unless a joint slides in between."""
+    start = next((start for start, end in robot.wire_frames if end == frame), frame)
+    body = robot.mounting(frame)[0]
+    return frame if body != robot.mounting(start)[0] and robot.sliding[body - 1] else start
 
 
 def _offset(robot: Robot, mount: str, frame: str) -> list[float]:

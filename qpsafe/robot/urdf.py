@@ -128,7 +128,9 @@ def _found(elements: Mapping[str, Element]) -> list[FoundJoint]:
         if kind == "fixed":
             continue
         limit, mimic = joint.find("limit"), joint.find("mimic")
-        lower, upper = (0.0, 0.0) if limit is None else (float(limit.get(key, "0")) for key in ("lower", "upper"))
+        lower = upper = 0.0
+        if limit is not None and kind in _KINDS:
+            lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
         follows = None
         if mimic is not None:
             values = float(mimic.get("offset", "0")), float(mimic.get("multiplier", "1"))

@@ -155,8 +155,9 @@ def _check_joint(path: Path, where: str, joint: Element, joints: dict[str, Eleme
             raise RobotFileError(path, f"{where}: limit lower", float(low), f"at most upper = {float(high)!r}")
     if limit is not None:
         for key in ("velocity", "effort"):
-            if limit.get(key) is not None:
-                _numbers(path, f"{where}: limit {key}", limit.get(key), 1, finite=False)
+            text = limit.get(key)
+            if text is not None and _numbers(path, f"{where}: limit {key}", text, 1, finite=False)[0] < 0.0:
+                raise RobotFileError(path, f"{where}: limit {key}", text, "a number >= 0")
 
 
 def _check_origin(path: Path, where: str, element: Element) -> None:
@@ -173,7 +174,7 @@ def _check_inertia(path: Path, where: str, link: Element) -> bool:
         return False
     _check_origin(path, f"{where}: inertial", inertial)
     element = inertial.find("mass")
-    mass = 0.0 if element is None else float(_numbers(path, f"{where}: mass", element.get("value"), 1)[0])
+    mass = float(_numbers(path, f"{where}: mass", None if element is None else element.get("value"), 1)[0])
     if mass < 0.0:
         raise RobotFileError(path, f"{where}: mass", mass, "a mass >= 0 [kg]")
     element = inertial.find("inertia")

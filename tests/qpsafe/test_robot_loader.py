@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +136,19 @@ def test_files_that_are_no_robot_are_errors(tmp_path: Path, text: str, expected:
         load_robot(path)
     assert caught.value.where == str(path)
     assert expected in caught.value.expected
+
+
+def test_a_robot_can_be_sent_to_another_process(tmp_path: Path) -> None:
+    from qpsafe.sensing.body import body_hulls
+
+    for path in (IRB140.folder, IRB140.model_path, urdf(tmp_path)):  # bundled, compiled by MuJoCo, URDF
+        robot = load_robot(path)
+        sent = pickle.loads(pickle.dumps(robot))
+        np.testing.assert_array_equal(
+            sent.pose(robot.frame_names[-1], robot.home), robot.pose(robot.frame_names[-1], robot.home)
+        )
+        for (*_, points), (*_, own) in zip(body_hulls(sent), body_hulls(robot), strict=True):
+            np.testing.assert_array_equal(points, own)
 
 
 def test_a_toml_elsewhere_describes_a_model_file(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from qpsafe.errors import RobotFileError
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
+from qpsafe.robot.starting_file import starting_robot_toml
 from qpsafe.sensing.body import body_hulls
 
 SEEDS = 100
@@ -97,3 +99,68 @@ def compare_hulls(robot: Robot, boxes: dict[str, list[np.ndarray]]) -> None:
                     break
             else:
                 raise AssertionError(f"no hull where {link} has a shape")
+
+
+@pytest.mark.parametrize("seed", [2, 5, 17, 31])  # 17: the wire ends at a joint that slides
+def test_a_starting_file_is_the_same_robot(seed: int, tmp_path: Path, urdf_writer: Any) -> None:
+    writer = urdf_writer(tmp_path, seed)
+    robot = load(writer.write(), hold=None if writer.mimic is None else {"axis0": 0.3, "level": -0.3})
+    (tmp_path / "robot.toml").write_text(starting_robot_toml(robot, tmp_path))
+    again = load(tmp_path)
+    assert (again.joint_names, again.frame_names) == (robot.joint_names, robot.frame_names)
+    assert again.wire_frames == robot.wire_frames
+    q = np.clip(np.random.default_rng(seed).uniform(-2.0, 2.0, robot.nq), robot.lower, robot.upper)
+    for frame in robot.frame_names:
+        np.testing.assert_allclose(again.pose(frame, q), robot.pose(frame, q), rtol=0, atol=1e-7)
+    for key in ("lower", "upper", "max_velocity", "max_acceleration", "home"):
+        np.testing.assert_allclose(getattr(again, key), getattr(robot, key), rtol=0, atol=1e-7)
+
+
+WORDS = (
+    "nan",
+    "inf",
+    "",
+    "x",
+    "-1",
+    "0",
+    "0 0 0",
+    "1e400",
+    "${a}",
+    "base",
+    "axis1",
+    "1 2",
+    "fixed",
+    "floating",
+    "planar",
+)
+
+
+@pytest.mark.parametrize("first", range(0, 60, 20))
+def test_a_broken_urdf_loads_or_is_refused_by_name(first: int, tmp_path: Path, urdf_writer: Any) -> None:
+    """Attributes and elements taken away, doubled or exchanged: no other error, nothing that is not finite."""
+    for seed in range(first, first + 20):
+        folder, rng = tmp_path / f"broken{seed}", np.random.default_rng(seed)
+        folder.mkdir()
+        path = urdf_writer(folder, seed).write()
+        text = path.read_text()
+        for _ in range(rng.integers(1, 4)):
+            attributes = list(re.finditer(r' \w+="([^"]*)"', text))
+            found = attributes[rng.integers(len(attributes))]
+            word = WORDS[rng.integers(len(WORDS))]
+            changes = [("", found.span()), (word, found.span(1))]
+            elements = list(re.finditer(r"<\w+[^<>]*/>", text))
+            if elements:
+                element = elements[rng.integers(len(elements))]
+                changes += [("", element.span()), (2 * element.group(), element.span())]
+            new, (start, stop) = changes[rng.integers(len(changes))]
+            text = text[:start] + new + text[stop:]
+        path.write_text(text)
+        try:
+            robot = load(path)
+            hulls = body_hulls(robot)
+        except RobotFileError as error:
+            assert "pinocchio can read" not in error.expected, error  # noqa: PT017  # that names no element
+        else:
+            for key in ("lower", "upper", "max_velocity", "max_acceleration", "home"):
+                assert np.isfinite(getattr(robot, key)).all()
+            assert all(np.isfinite(vertices).all() for _, _, vertices in hulls)
