@@ -135,9 +135,9 @@ class Recovery:
             self._last = [(state, sample) for sample in samples]  # only the last tick's will be of interest
             return tuple(samples)
         if self.way is not None:
-            samples = self.way.update(cdf_n, state, (min(activations),))
+            on_the_way = self.way.update(cdf_n, state, (min(activations),))
             if self.way.phase != FOLLOWING:
-                return samples
+                return on_the_way
             self.way = None  # there: what is left is the way from a posture that met the tasks
         return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
 

@@ -20,7 +20,7 @@ def tasks_on(trajectory: Any) -> list[Any]:
 
 
 def after_a_hand(run: Any, robot: Any, seed: int, hand: float = 60.0) -> Any:
-    """The last tick, and the ticks at rest: a hand moves around the tool and leaves; a minute at most passes."""
+    """The last tick, and the ticks at rest: a hand moves around the tool, leaves, and a minute passes at most."""
     loop = run()
     rng = np.random.default_rng(seed)
     rate, phase = rng.uniform(0.3, 1.0, 3), rng.uniform(0.0, 6.28, 3)
