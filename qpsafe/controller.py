@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.braking import brake, slower
 from qpsafe.checks import (
-    check_command,
     check_tasks,
     checked_activation,
     checked_dt,
@@ -27,17 +26,14 @@ from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.errors import in_words
 from qpsafe.laws.hierarchical import HierarchicalLaw
-from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.problem import Law
-from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.limits import JointLimits
 from qpsafe.parts import Parts
 from qpsafe.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.reference import JointReference
-from qpsafe.resolve import Resolve, Resolved, judged
+from qpsafe.resolve import Resolved, judged
 from qpsafe.returns import GentleLimits
 from qpsafe.robot.state import RobotState
-from qpsafe.sense import Seen, Sense
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -45,7 +41,8 @@ from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
 from qpsafe.speed_cap import slowed
-from qpsafe.stall import StallWatch
+from qpsafe.stages import Stages
+from qpsafe.stall import CALM, StallWatch
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
@@ -54,8 +51,6 @@ if TYPE_CHECKING:
 
 #: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint, tuned on the first experiment.
 DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
-_CALM = 0.01  # [rad/s] evasive velocity that does not explain motion
-_BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep from what nobody else knows
 _WAY_LAW = HierarchicalLaw()
 
 
@@ -119,8 +114,9 @@ class SafetyController(Parts):
         self.barrier = barrier
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
-        self._sense = Sense(robot, self._sensing, self._field, self._evasion)
-        self._resolve = Resolve(robot, self._tasks, self._law, self._dt)
+        self._stages = Stages(robot, self._dt)
+        self._stages.sense(self._sensing, self._field, self._evasion)
+        self._stages.resolve(self._tasks, self._law)
         self.reset()
 
     def reset(self) -> None:
@@ -220,7 +216,7 @@ class SafetyController(Parts):
         barrier, recovery = self._barrier, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        seen = self._current_sense()(q, qd, distances, points, ages)
+        seen = self._stages.sense(self._sensing, self._field, self._evasion)(q, qd, distances, points, ages)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
@@ -228,7 +224,9 @@ class SafetyController(Parts):
         commanded = RobotState(self._robot, self._q)
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
-            self._look(seen, commanded, activations)
+            explained = seen.capped or not min(activations) >= 1.0 or (barrier is not None and len(seen.points) > 0)
+            still = float(np.abs(qd0).max()) < CALM
+            stall.watch(self._seq, self._tasks, self._law, recovery, commanded, self._qd, explained, still)
         samples = recovery.update(cdf_n, commanded, activations)
         tasks, active, law = self._tasks, activations, self._law
         if recovery.way is not None:  # back through the joints
@@ -238,16 +236,13 @@ class SafetyController(Parts):
         limits = self._limits
         if recovery.phase == RECOVERING and limits is not None:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
-        measured = None if barrier is None else self._robot.at(as_joint_position(q, self._robot))
-        level = barrier and barrier.level(measured, self._qd, seen.points, seen.danger)
-        soft = (level,) if level else ()
-        resolve = self._current_resolve(tasks, law)
-        resolved = resolve(commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
+        resolve = self._stages.resolve(tasks, law)
+        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits)
+        if barrier is None:
+            resolved = resolve(*given)
+        else:
+            resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
         command = resolved.command
-        if barrier is not None:  # exact, as far as the acceleration limits allow
-            command = barrier.scale(measured, command, seen.points).factor * command
-            command = command if resolved.box is None else resolved.box.clip(command)
-            check_command(command, self._dt)
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
@@ -277,20 +272,6 @@ class SafetyController(Parts):
             off_path=None if recovery.on_path else _errors(self._tasks, commanded, recovery.path_time),
         )
 
-    def _current_sense(self) -> Sense:
-        """The first half of a tick with the present parts."""
-        sensing, field, evasion = self._sense.parts
-        if not (sensing is self._sensing and field is self._field and evasion is self._evasion):
-            self._sense = Sense(self._robot, self._sensing, self._field, self._evasion)
-        return self._sense
-
-    def _current_resolve(self, tasks: Sequence[Task], law: Law) -> Resolve:
-        """The second half of a tick with the present parts."""
-        made = self._resolve.parts
-        if not (made[0] is tasks and made[1] is law):
-            self._resolve = Resolve(self._robot, tasks, law, self._dt)
-        return self._resolve
-
     @property
     def _acceleration(self) -> NDArray[np.float64]:
         """That led to the commanded velocity (n,) [rad/s²]."""
@@ -314,20 +295,6 @@ class SafetyController(Parts):
             joint_names=self._robot.joint_names,
             resolved=Resolved(braked.command, 0.0, False, braked.box),
         )
-
-    def _look(self, seen: Seen, commanded: RobotState, activations: tuple[float, ...]) -> None:
-        """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be."""
-        stall, recovery = self._stall, self._recovery
-        explained = seen.capped or not min(activations) >= 1.0 or (self._barrier is not None and len(seen.points) > 0)
-        explained = explained or recovery.way is not None
-        if explained and stall.held:
-            stall.clear()
-        if self._seq % stall.every == 0:
-            bundled = isinstance(self._law, _BUNDLED)
-            calm = bundled and float(np.abs(seen.qd0).max()) < _CALM
-            stall.look(self._tasks, commanded, self._qd, recovery.path_time, explained, calm)
-            if stall.stalled and stall.met is not None and bundled and recovery.lead(stall.met):
-                stall.clear()
 
     def _reference(self, command: NDArray[np.float64]) -> JointReference:
         """Where a command (n,) [rad/s] leads; its arrays are nobody else's."""

@@ -131,9 +131,9 @@ class Recovery:
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
             return tuple([task.trajectory.sample(self.path_time) for task in self.tasks])
         if self.phase == SUSPENDED:
-            samples = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
-            self._last = [(state, sample) for sample in samples]  # only the last tick's will be of interest
-            return tuple(samples)
+            held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
+            self._last = [(state, sample) for sample in held]  # only the last tick's will be of interest
+            return tuple(held)
         if self.way is not None:
             on_the_way = self.way.update(cdf_n, state, (min(activations),))
             if self.way.phase != FOLLOWING:

@@ -12,11 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.nullspace import NullspaceLaw
+from qpsafe.laws.weighted import WeightedLaw
+
 if TYPE_CHECKING:
+    from qpsafe.laws.problem import Law
+    from qpsafe.recovery import Recovery
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
+CALM = 0.01  # [rad/s] evasive velocity that does not explain motion
+_BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep from what nobody else knows
 PERIOD = 0.2  # [s] between two looks
 _LESS = 0.95  # an error that has shrunk to this share has shrunk
 _NOTHING = 1e-6  # [m or rad] errors below need not shrink
@@ -60,6 +68,30 @@ class StallWatch:
         self._best, self._last = np.zeros(0), np.zeros(0)
         self._idle = 0  # looks without progress
         self._grown = np.zeros(0, dtype=int)  # looks in which a task's error grew
+
+    def watch(
+        self, tick: int, tasks: Sequence[Task], law: Law, recovery: Recovery, state: RobotState,
+        qd: NDArray[np.float64], explained: bool, calm: bool,
+    ) -> None:  # fmt: skip
+        """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be.
+
+        Args:
+            tick: Its number; it is looked at every `every` ticks.
+            tasks, law: Of the controller.
+            recovery: Where it is on its way back.
+            state: Commanded configuration.
+            qd: Commanded velocity (n,) [rad/s].
+            explained: Whether danger or a sensor explains whatever errors there are.
+            calm: Whether nothing but tasks moves the robot.
+        """  # fmt: skip
+        explained = explained or recovery.way is not None
+        if explained and self.held:
+            self.clear()
+        if tick % self.every == 0:
+            bundled = isinstance(law, _BUNDLED)
+            self.look(tasks, state, qd, recovery.path_time, explained, calm and bundled)
+            if self.stalled and self.met is not None and bundled and recovery.lead(self.met):
+                self.clear()
 
     def look(
         self,
