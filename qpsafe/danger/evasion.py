@@ -109,7 +109,7 @@ class Evasion:
         # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
         self._A = expm(-np.linalg.solve(self._mass, self._damping) * dt)
         self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
-        for array in (self._mass, self._damping):
+        for array in (self._mass, self._damping, self._A, self._B):
             array.flags.writeable = False
         self.velocity = np.zeros(n)
 

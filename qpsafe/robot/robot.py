@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from copy import copy
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.mjcf import ENDLESS
-from qpsafe.robot.spec import Region, RobotSpec, Tool
+from qpsafe.robot.spec import HeldJoint, Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
 from qpsafe.words import counted
@@ -44,7 +46,6 @@ class Robot(Fixed):
         home: A pose to start from, (n,) [rad].
         sliding: Which joints slide, (n,).
         endless: Which joints turn without end; joint tasks take the short way there, (n,).
-        held: Joints of the model file that are held in place, and where.
         frame_names: Names that `pose` and `jacobian` accept.
         wire_frames: Start and end frame of each segment of the wire model.
         wire_end_frames: The different frames in `wire_frames`, base to tip.
@@ -94,7 +95,7 @@ class Robot(Fixed):
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
         self.notes = spec.notes
-        self.held = spec.held
+        self._held = spec.held
         self.hulls = spec.hulls
         self.frame_names = tuple(spec.frames)
         self._frame_ids = {name: int(model.getFrameId(target)) for name, target in spec.frames.items()}
@@ -106,6 +107,8 @@ class Robot(Fixed):
         self.wire_indices = (starts, stops)
         self.ends = len(self.wire_end_frames)
         self.tree = tree_of(model, tuple(self._frame_ids[name] for name in self.wire_end_frames))
+        for array in (*self.wire_indices, *self.tree):  # compiled code has copies of them
+            array.flags.writeable = False
         self.memory = self.tree.memory
         self.sliding: NDArray[np.bool_] = ~np.any(self.tree.axes[:, 3:], axis=1)
         self.endless: NDArray[np.bool_] = ~self.sliding & (self.upper - self.lower >= 2.0 * ENDLESS - 1e-3)
@@ -113,6 +116,11 @@ class Robot(Fixed):
         self._mountings = {
             name: (int(frame.parentJoint), _read_only(frame.placement.homogeneous)) for name, frame in frames.items()
         }
+
+    @property
+    def held(self) -> Mapping[str, HeldJoint]:
+        """Joints of the model file that are held in place, and where."""
+        return MappingProxyType(dict(self._held))
 
     def __repr__(self) -> str:
         size = f"{counted(self.nq, 'joint')}, {counted(len(self.wire_frames), 'wire link')}"

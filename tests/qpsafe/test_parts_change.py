@@ -91,8 +91,6 @@ EXCHANGED = {"controller": {"law", "field", "activation", "evasion", "limits", "
 #: Read at every tick, and nowhere else.
 LIVE = {kind: {"name", "essential"} for kind in ("position", "orientation", "frame", "relative")}
 LIVE |= {kind: {"name", "essential", "frames"} for kind in ("joint", "posture")}  # they have no frames
-#: Handed to compiled code at every tick, as they are and not as a copy: what is written into them takes effect, too.
-BY_REFERENCE = {"evasion": {"matrices"}, "sensing": {"tables"}, "robot": {"tree", "wire_indices"}}
 #: The library below.
 FOREIGN = {"robot": {"model"}}
 
@@ -131,8 +129,6 @@ def test_a_parameter_refuses_to_be_changed(kind: str) -> None:
                     setattr(one, key, value)
                 with pytest.raises((AttributeError, qpsafe.ConfigurationError), match=key):
                     delattr(one, key)
-            if key in BY_REFERENCE.get(kind, set()):
-                continue
             for container in containers(value):
                 assert isinstance(container, np.ndarray), (kind, key, "is a list or the like")
                 if container.size and (one is part or kind in ("limits", "fixed pose")):
@@ -141,7 +137,7 @@ def test_a_parameter_refuses_to_be_changed(kind: str) -> None:
 
 def test_what_is_exempt_is_there() -> None:
     made = parts()
-    for table in (STATE, EXCHANGED, LIVE, FOREIGN, BY_REFERENCE):
+    for table in (STATE, EXCHANGED, LIVE, FOREIGN):
         for kind, keys in table.items():
             assert all(hasattr(made[kind], key) for key in keys), kind
 
@@ -354,31 +350,3 @@ def test_sensing_that_is_copied_goes_on_alone() -> None:
     other = copy.deepcopy(sensing)
     assert all(mine is not others for mine, others in zip(sensing.memory, other.memory, strict=True))
     assert other.memory[0] is other.health.counts
-
-
-@pytest.mark.parametrize("kind", BY_REFERENCE)
-def test_what_compiled_code_is_given_by_reference_takes_effect(kind: str) -> None:
-    """The quick way and the general way see the same numbers after they were written to."""
-
-    def written(robot: Any, quick: bool) -> Any:
-        here = qpsafe.FixedPose(HOME)
-        tasks = [qpsafe.PositionTask("tcp", here), qpsafe.OrientationTask("tcp", here)]
-        controller = qpsafe.SafetyController(robot, tasks, field=qpsafe.DangerField() if quick else OwnField())
-        last = run(controller, range(25), ROBOT.home, np.zeros(N))[-1].reference
-        assert controller.sensing is not None
-        if kind == "evasion":
-            controller.evasion.matrices[1][:] *= 0.5
-        elif kind == "sensing":
-            controller.sensing.tables[-2][3] = -1.0  # max_age: all readings are stale
-        else:
-            robot.tree.end_places[-1, 2] += 0.1
-        return run(controller, range(30, 50), last.q, last.qd)  # distances
-
-    ways = [written(qpsafe.load_robot("irb140"), quick) for quick in (True, False)]
-    for a, b in zip(*ways, strict=True):
-        assert np.abs(a.reference.q - b.reference.q).max() < 1e-9
-        assert a.status == b.status
-    other = made()
-    last = run(other, range(25), ROBOT.home, np.zeros(N))[-1].reference
-    calm = run(other, range(30, 50), last.q, last.qd)
-    assert not np.array_equal(calm[-1].reference.q, ways[0][-1].reference.q)
