@@ -11,7 +11,6 @@ are doubled, dependent or zero, bounds that a vertex of the box meets exactly, a
 from __future__ import annotations
 
 import argparse
-import json
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -20,6 +19,7 @@ import numpy as np
 from hqp_exact import solve_exactly
 from hqp_family import Array, grid
 
+from qpsafe.json_text import json_text
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import solve_hierarchy
@@ -132,7 +132,7 @@ def main() -> None:
     a = parser.parse_args()
     found: dict[str, Any] = judge(a.count, a.seed, tuple(a.solver or ("own",)))
     if a.json:
-        print(json.dumps({"problems": a.count, "seed": a.seed, "verdicts": found}, indent=2))
+        print(json_text({"problems": a.count, "seed": a.seed, "verdicts": found}))
         return
     for name, verdicts in found.items():
         print(f"{name:20}" + ", ".join(f"{number} {word}" for word, number in sorted(verdicts.items())))

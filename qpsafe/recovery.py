@@ -55,8 +55,7 @@ class Recovery:
         self.waits_for: tuple[str, ...] = ()
         self._rate = 1.0  # of the clock
         self._changed = self._led = False
-        #: The way back through the joints, while it is taken.
-        self.way: Recovery | None = None
+        self._way: Recovery | None = None
         self._cursors: list[_Cursor] = []
         self._passed: set[tuple[float, str]] = set()  # events at the very time where the clock stands
         self._due: tuple[list[tuple[_Cursor, int]], set[tuple[float, str]]] | None = None  # found, not passed yet
@@ -82,7 +81,7 @@ class Recovery:
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks = tuple(tasks)
         self.suspend_above = suspend_above
-        self.way = None
+        self._way = None
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
@@ -100,9 +99,14 @@ class Recovery:
         return self._rules
 
     @property
+    def way(self) -> Recovery | None:
+        """The way back through the joints, while it is taken."""
+        return self._way
+
+    @property
     def clocks(self) -> tuple:
         """Phase, times on the path and on the returns; set them back when the robot could not go along."""
-        way = None if self.way is None else self.way.clocks
+        way = None if self._way is None else self._way.clocks
         return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self.phase, way
 
     @clocks.setter
@@ -110,8 +114,8 @@ class Recovery:
         self.path_time, self._rate = clocks[:2]
         self._returns, self._pending, self.phase = list(clocks[2]), list(clocks[3]), clocks[4]
         self._due = None
-        if self.way is not None and clocks[5] is not None:
-            self.way.clocks = clocks[5]
+        if self._way is not None and clocks[5] is not None:
+            self._way.clocks = clocks[5]
 
     def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
         """Advance one tick and give each task its reference.
@@ -134,11 +138,11 @@ class Recovery:
             held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
             self._last = [(state, sample) for sample in held]  # only the last tick's will be of interest
             return tuple(held)
-        if self.way is not None:
-            on_the_way = self.way.update(cdf_n, state, (min(activations),))
-            if self.way.phase != FOLLOWING:
+        if self._way is not None:
+            on_the_way = self._way.update(cdf_n, state, (min(activations),))
+            if self._way.phase != FOLLOWING:
                 return on_the_way
-            self.way = None  # there: what is left is the way from a posture that met the tasks
+            self._way = None  # there: what is left is the way from a posture that met the tasks
         return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
 
     @property
@@ -198,8 +202,8 @@ class Recovery:
         if self.phase != RECOVERING or self._led or not self.rules.enabled:
             return False
         task = JointTask(FixedJoints(posture))
-        self._led, self.way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
-        self.way.set_tasks([task], self.suspend_above, restart=False)
+        self._led, self._way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
+        self._way.set_tasks([task], self.suspend_above, restart=False)
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
         self._offsets = [None] * len(self.tasks)
@@ -207,7 +211,7 @@ class Recovery:
 
     def _suspend(self) -> None:
         self.phase, self._rate = SUSPENDED, 0.0
-        self.way, self._led = None, False
+        self._way, self._led = None, False
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
 

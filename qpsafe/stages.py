@@ -31,6 +31,10 @@ class Stages:
         self._sense: Sense | None = None
         self._resolve: Resolve | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy makes its own: what is kept here cuts its memory into views, which copying would tear apart."""
+        return Stages, (self._robot, self._dt)
+
     def sense(self, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> Sense:
         """From measurements to q̇0."""
         made = self._sense

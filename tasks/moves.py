@@ -46,7 +46,7 @@ class Line(Fixed):
         ConfigurationError: A pose is none, or start and goal are the same.
     """
 
-    fixed = frozenset(("start", "goal", "law", "duration"))
+    fixed = frozenset(("start", "goal", "law", "duration", "length", "angle"))
 
     def __init__(self, start: ArrayLike, goal: ArrayLike, linear: Rates = LINEAR, angular: Rates = ANGULAR) -> None:
         name = type(self).__name__

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -176,7 +177,7 @@ class SensorInput:
         found = decode(data, self.count)
         if found is None:
             self.counts.rejected += 1
-            self.refusal = f"{len(data)} bytes that are no sampling of {self.count} spots"
+            self.refusal = f"{counted(len(data), 'byte')}, no sampling of {counted(self.count, 'spot')}"
             return 0
         if self._newest is not None and not restarted and not 0 < (found.seq - self._newest.seq) % 2**32 < 2**31:
             self.counts.stale += 1

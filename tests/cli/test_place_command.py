@@ -27,7 +27,7 @@ def _found_by_name(name: str, wanted: int) -> candidates.Candidates:
     return _find(qpsafe.load_robot(name), wanted)
 
 
-def _found(robot: Robot, wanted: int) -> candidates.Candidates:
+def _found(robot: Robot, wanted: int, **_: object) -> candidates.Candidates:
     return _found_by_name(robot.name, wanted)
 
 

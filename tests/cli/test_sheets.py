@@ -95,6 +95,7 @@ def of_fixed(screen: Console, folder: Path) -> None:
         checks=[kept, kept._replace(kept=False)],
         tracking=(0.0123, 0.1234),
         unusual=(1234, HOSTILE),
+        left_out=(HOSTILE, "position error"),
     )
     demo.show(report, "hierarchical law, strict projection", screen)
 
@@ -115,7 +116,8 @@ def of_path(screen: Console, folder: Path) -> None:
     numbers = (1.2e-3, 1.2e-5, 1.5e-3, 1.0, 12345, 0.912, 1.0, 0.912, 1.234, 1.2e-4, 12, 44.12)
     found = {name: PathFigures(*numbers) for name in ("strict", "paper", "nullspace", "strict, no recovery")}
     others = {name: found[name] for name in ("paper", "nullspace")}
-    demo_path.show(found, promises(found["strict"], found["strict, no recovery"], others), screen)
+    checks, _ = promises(found["strict"], found["strict, no recovery"], others)
+    demo_path.show(found, checks, ["an event that did not happen"], screen)
 
 
 def of_pick(screen: Console, folder: Path) -> None:
@@ -205,6 +207,9 @@ def of_stream(screen: Console, folder: Path) -> None:
         "memory": {"steady": 123e6, "end": 116.7e6, "growth": -6.3e6},
         "failure": HOSTILE,
         "watchdog": {"asked": True},
+        "troubles": [HOSTILE],
+        "refused": "3 datagrams refused",
+        "events": {"counts": {HOSTILE: 12}, "last": []},
         "at_rest": False,
     }
     stream_report.show(result, screen)

@@ -198,7 +198,7 @@ def test_a_controller_that_fails_stops_the_robot(cell: Cell) -> None:
 
 
 def test_a_robot_that_slides_is_not_streamed_as_angles(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cell.robot, "sliding", np.array([True, False, False, False, False, False]))
+    monkeypatch.setitem(cell.robot.__dict__, "sliding", np.array([True, False, False, False, False, False]))
     with pytest.raises(qpsafe.ConfigurationError, match=r"joint_1.*angles"):
         StreamLoop(cell.here.loop.controller, cell.here.loop.session)
 

@@ -40,7 +40,7 @@ def test_the_irb_140_s_stage_is_the_first_experiment_as_it_was() -> None:
 
 def test_another_robot_gets_its_stage_by_the_rule(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = qpsafe.load_robot("irb140")
-    monkeypatch.setattr(robot, "name", "somebody's own")
+    monkeypatch.setitem(robot.__dict__, "name", "somebody's own")
     front = robot_stage(robot).choreography.approaches[0]
     tip = robot.pose("tcp", robot.home)[0, 3]
     assert front.medium_distance == pytest.approx(tip + MEDIUM_GAP)
