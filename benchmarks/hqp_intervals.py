@@ -19,10 +19,10 @@ import numpy as np
 from hqp_exact import solve_exactly
 from hqp_family import Array, grid
 
-from qpsafe.json_text import json_text
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.json_text import json_text
 
 WRONG = 1e-7  # relative to the numbers of the problem: an answer farther from the exact one than this is wrong
 

@@ -17,6 +17,7 @@ from qpsafe.limits import JointLimits
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.irc5_bench import Turn, Workbench
 from qpsafe.sim.irc5_faults import CASES, Case
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -120,7 +121,9 @@ def run_faults(
                     if progress is not None:
                         progress(len(done), count)
         except BrokenProcessPool:
-            raise QpsafeError(f"a worker process died after {len(done)} of {count} moments (out of memory?)") from None
+            raise QpsafeError(
+                f"a worker process died after {len(done)} of {counted(count, 'moment')} (out of memory?)"
+            ) from None
         finally:
             _WORK.clear()
     else:

@@ -38,6 +38,7 @@ from qpsafe.tasks.reach import UnreachableError, checked_poses, follow, joints_f
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.timing import Rates
 from qpsafe.tasks.toml_text import TomlText
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -167,7 +168,7 @@ class _Builder:
         """Give up where a program is so long that to follow it takes minutes."""
         self.checks += poses
         if self.checks > MOST_CHECKS:
-            found = f"{len(self.file.segment)} segments in {self.rounds} rounds"
+            found = f"{counted(len(self.file.segment), 'segment')} in {counted(self.rounds, 'round')}"
             expected = f"a program with at most {MOST_CHECKS} poses to check; run it in parts, each from its own file"
             raise self.wrong(["segment"], found, expected)
 

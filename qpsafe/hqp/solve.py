@@ -23,6 +23,7 @@ from qpsafe.hqp.solution import (
     STOPPED,
     Solution,
 )
+from qpsafe.words import counted
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array
     """ε of every level, hard rows first, which have none; None if all are 0."""
     values = np.array(damping, _FLOAT)
     if values.shape not in ((), (levels,)) or not np.all((values >= 0.0) & (values < np.inf)):
-        expected = f"a number >= 0, or one for each of {levels} levels, in the unit of A"
+        expected = f"a number >= 0, or one for each of {counted(levels, 'level')}, in the unit of A"
         raise ConfigurationError("solve_hierarchy", "damping", damping, expected)
     if not values.any():
         return None

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -54,7 +55,7 @@ class Axes:
         if len(set(outer)) != len(outer) or not set(outer) <= set(range(self.n)):
             raise ConfigurationError("Axes", "external", self.external, f"different places from 0 to {self.n - 1}")
         if len(inner) > INNER:
-            expected = f"at least {self.n - INNER} of {self.n} joints: EGM has six places for the others"
+            expected = f"at least {self.n - INNER} of {counted(self.n, 'joint')}: EGM has six places for the others"
             raise ConfigurationError("Axes", "external", self.external, expected)
         object.__setattr__(self, "inner", np.array(inner, dtype=np.intp))
         object.__setattr__(self, "outer", np.array(outer, dtype=np.intp))

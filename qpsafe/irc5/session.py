@@ -64,7 +64,7 @@ class EgmSession:
             raise ConfigurationError("EgmSession", "joint_names", joint_names, f"{self.n} names")
         self.axes = axes_of(self.n) if axes is None else axes
         if self.axes.n != self.n:
-            raise ConfigurationError("EgmSession", "axes", self.axes.n, f"axes of {self.n} joints")
+            raise ConfigurationError("EgmSession", "axes", self.axes.n, f"axes of {counted(self.n, 'joint')}")
         self.inbox = Inbox(limits.lower, limits.upper, self.rules, peer, self.axes)
         self.counts: Counter[str] = self.inbox.counts
         self.phase = Phase.WAITING

@@ -42,7 +42,7 @@ def run(*arguments: str) -> object:
 def test_a_placement_is_written_and_loads(tmp_path: Path) -> None:
     result = run("--spots", "8", "--json", "--out", str(tmp_path / "out"))
     assert result.exit_code == 0, result.output
-    assert "40 candidate nodes: 40 in this grid" in " ".join(result.stderr.split())  # its progress
+    assert "40 candidate nodes" in " ".join(result.stderr.split())  # its progress
     report = json.loads(result.stdout)
     assert report == json.loads((tmp_path / "out" / "report.json").read_text())
     spots = qpsafe.SpotArray.load(tmp_path / "out" / "spots.toml", qpsafe.load_robot("irb140"))
