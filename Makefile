@@ -6,6 +6,8 @@ OUT    ?= out/demo-fixed
 TYPED  := build/typed
 # two processes that share files of tests, not single tests: a file's experiments are simulated once; tests/conftest.py orders
 SHARED := -n 2 --dist loadfile --no-loadscope-reorder
+# tests start dozens of Pythons: each would compile every source again
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-slow dev lint bench clean
 
