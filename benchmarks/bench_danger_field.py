@@ -10,7 +10,7 @@ import numpy as np
 
 from qpsafe.cli.outputs import try_file
 from qpsafe.danger.field import DangerField
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 from qpsafe.robot.wire import Wire
 
 POINTS, LINKS, GOAL_US = 20, 6, 40.0

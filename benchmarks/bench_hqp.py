@@ -21,12 +21,12 @@ from hqp_exact import solve_exactly
 from hqp_family import KINDS, Hierarchy, drift, family
 
 from qpsafe.cli.outputs import try_file
-from qpsafe.hqp.cascade import solve_cascade
+from qpsafe.hqp.backends.cascade import solve_cascade
 from qpsafe.hqp.level import Level
-from qpsafe.hqp.native_daqp import arrange, call_daqp
-from qpsafe.hqp.native_proxqp import solve_proxqp
+from qpsafe.hqp.backends.native_daqp import arrange, call_daqp
+from qpsafe.hqp.backends.native_proxqp import solve_proxqp
 from qpsafe.hqp.solve import solve_hierarchy
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 
 Solver = Callable[[], np.ndarray | None]
 
@@ -274,7 +274,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.out:
         try_file("bench_hqp", "--out", arguments.out)
-    from qpsafe.timing import machine
+    from qpsafe.bench.clock import machine
 
     a = arguments
     result = {"machine": machine(), **bench(a.count, a.ticks, a.repeats, a.seed, tuple(a.only))}

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.cli.outputs import try_file
-from qpsafe.json_text import json_text
-from qpsafe.sim.irc5_compare import stream_process
-from qpsafe.timing import machine
-from qpsafe.words import growth
+from qpsafe.text.json_text import json_text
+from qpsafe.sim.irc5.compare import stream_process
+from qpsafe.bench.clock import machine
+from qpsafe.text.words import growth
 
 MAIN = "from qpsafe.cli.main import main; main()"
 BUSY = "import numpy as np\nx = np.ones(10000)\nwhile True:\n    x = x * 1.0000001 + sum(range(1000)) * 1e-12"

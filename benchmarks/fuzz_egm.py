@@ -24,7 +24,7 @@ from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.inbox import REFUSALS
 from qpsafe.irc5.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
 from qpsafe.irc5.session import EgmSession
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 from qpsafe.limits import JointLimits
 
 N, DT = 6, 0.004

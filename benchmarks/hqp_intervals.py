@@ -22,7 +22,7 @@ from hqp_family import Array, grid
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import solve_hierarchy
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 
 WRONG = 1e-7  # relative to the numbers of the problem: an answer farther from the exact one than this is wrong
 

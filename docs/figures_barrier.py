@@ -9,7 +9,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import qpsafe
-from qpsafe.sim.fixed import FixedExperiment
+from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 
 HERE = Path(__file__).parent / "img"
 STYLES = {None: ("#555555", "--"), 10.5: ("#0b5fa5", "-"), 9.5: ("#c0392b", "-.")}

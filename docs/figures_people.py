@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 import qpsafe
-from qpsafe.sim.fast_person import at_speed, fast_figure, runs
-from qpsafe.sim.fixed import FixedExperiment
-from qpsafe.sim.scene import build_scene
-from qpsafe.sim.story_file import load_story
-from qpsafe.sim.story_plots import plan_figure
+from qpsafe.sim.experiments.fast_person import at_speed, fast_figure, runs
+from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.sim.world.scene import build_scene
+from qpsafe.sim.stories.file import load_story
+from qpsafe.sim.drawing.stories import plan_figure
 
 ROOT = Path(__file__).resolve().parents[1]
 IMG = ROOT / "docs" / "img"
@@ -29,7 +29,7 @@ def stories_people() -> None:
     """Six moments of the example."""
     from PIL import Image, ImageDraw, ImageFont
 
-    from qpsafe.sim.render import Camera
+    from qpsafe.sim.drawing.render import Camera
 
     story = load_story(STORY)
     scene = build_scene(qpsafe.load_robot("irb140"), people=story.persons)
@@ -57,7 +57,7 @@ def fast_person_frames() -> None:
 
     from PIL import Image
 
-    from qpsafe.sim.film import Film
+    from qpsafe.sim.drawing.film import Film
 
     robot, story = qpsafe.load_robot("irb140"), at_speed(2.0)
     experiment = FixedExperiment(robot, story=story, duration=4.04)

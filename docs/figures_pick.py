@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 import qpsafe
-from qpsafe.sim.pick_place import PickPlaceExperiment
-from qpsafe.sim.pick_plots import seeds_figure, timeline
-from qpsafe.sim.pick_seeds import run_seeds
-from qpsafe.sim.snapshots import draw
+from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.experiments.pick_place.plots import seeds_figure, timeline
+from qpsafe.sim.experiments.pick_place.seeds import run_seeds
+from qpsafe.sim.experiments.pick_place.snapshots import draw
 
 IMG = Path(__file__).resolve().parent / "img"
 

@@ -15,7 +15,7 @@ import qpsafe
 from qpsafe.sensing.calibration_plot import calibration_figure
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sharp import PEAK, SharpConverter, SharpCurve
-from qpsafe.sim.sharp import SharpModel, SharpSensors
+from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 IMG = Path(__file__).resolve().parent / "img"
 BLUE, RED, GREY, GREEN = "#0b5fa5", "#c0392b", "#777777", "#2a8c3c"

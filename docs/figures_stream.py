@@ -14,8 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import qpsafe
-from qpsafe.sim.irc5_bench import Workbench
-from qpsafe.sim.irc5_link import NO_FAULTS, WireFaults
+from qpsafe.sim.irc5.bench import Workbench
+from qpsafe.sim.irc5.link import NO_FAULTS, WireFaults
 
 IMG = Path(__file__).resolve().parent / "img"
 COLOURS = {

@@ -14,7 +14,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "Activation": "qpsafe.danger.activation",
     "ConfigurationError": "qpsafe.errors",
-    "DangerBarrier": "qpsafe.danger.barrier",
+    "DangerBarrier": "qpsafe.laws.barrier",
     "DangerField": "qpsafe.danger.field",
     "Evasion": "qpsafe.danger.evasion",
     "FixedPose": "qpsafe.tasks.trajectory",
@@ -31,15 +31,15 @@ _PUBLIC = {
     "PostureTask": "qpsafe.tasks.joint",
     "Program": "qpsafe.tasks.program",
     "QpsafeError": "qpsafe.errors",
-    "RecoveryRules": "qpsafe.recovery",
+    "RecoveryRules": "qpsafe.recovery.recovery",
     "RelativeFrameTask": "qpsafe.tasks.frame",
     "RobotFileError": "qpsafe.errors",
     "RobotWarning": "qpsafe.errors",
     "SafetyController": "qpsafe.controller",
     "SensingRules": "qpsafe.sensing.rules",
     "SpotArray": "qpsafe.sensing.spots",
-    "StopCategory": "qpsafe.supervisor",
-    "Supervisor": "qpsafe.supervisor",
+    "StopCategory": "qpsafe.irc5.supervisor",
+    "Supervisor": "qpsafe.irc5.supervisor",
     "Threshold": "qpsafe.danger.activation",
     "Tick": "qpsafe.tick",
     "WeightedLaw": "qpsafe.laws.weighted",
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from qpsafe.controller import SafetyController as SafetyController
     from qpsafe.danger.activation import Activation as Activation
     from qpsafe.danger.activation import Threshold as Threshold
-    from qpsafe.danger.barrier import DangerBarrier as DangerBarrier
+    from qpsafe.laws.barrier import DangerBarrier as DangerBarrier
     from qpsafe.danger.evasion import Evasion as Evasion
     from qpsafe.danger.field import DangerField as DangerField
     from qpsafe.danger.thresholds import robot_activation as robot_activation
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from qpsafe.laws.nullspace import nullspace_velocity as nullspace_velocity
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
     from qpsafe.limits import JointLimits as JointLimits
-    from qpsafe.recovery import RecoveryRules as RecoveryRules
+    from qpsafe.recovery.recovery import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference
     from qpsafe.robot.loader import bundled_robots as bundled_robots
     from qpsafe.robot.loader import load_robot as load_robot
@@ -87,8 +87,8 @@ if TYPE_CHECKING:
     from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
     from qpsafe.sensing.spots import load_spots as load_spots
-    from qpsafe.supervisor import StopCategory as StopCategory
-    from qpsafe.supervisor import Supervisor as Supervisor
+    from qpsafe.irc5.supervisor import StopCategory as StopCategory
+    from qpsafe.irc5.supervisor import Supervisor as Supervisor
     from qpsafe.tasks.frame import FrameTask as FrameTask
     from qpsafe.tasks.frame import RelativeFrameTask as RelativeFrameTask
     from qpsafe.tasks.joint import JointTask as JointTask

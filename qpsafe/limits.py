@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import entry, inline, readable
+from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 

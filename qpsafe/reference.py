@@ -27,7 +27,7 @@ class ServoGains(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointReference:
-    """Joint references of one tick, arm side, SI. For the motor side, see `qpsafe.irc5.gears`.
+    """Joint references of one tick, arm side, SI. For the motor side, see `qpsafe.irc5.records.gears`.
 
     Two are equal if all their numbers are, NaN included.
 

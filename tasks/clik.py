@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, Vector, dot, entry, inline, readable, scale
+from qpsafe.compiled.compiled import Array, Vector, dot, entry, inline, readable, scale
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, place
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.task import Misfit, Task
 from qpsafe.tasks.trajectory import FixedJoints, JointSample, Trajectory
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

@@ -37,8 +37,8 @@ from qpsafe.tasks.program_tables import ArcSegment, DwellSegment, EventSegment, 
 from qpsafe.tasks.reach import UnreachableError, checked_poses, follow, joints_for
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.timing import Rates
-from qpsafe.tasks.toml_text import TomlText
-from qpsafe.words import counted
+from qpsafe.text.toml_text import TomlText
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

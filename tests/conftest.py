@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from qpsafe.timing_compile import modules
+from qpsafe.bench.compilation import modules
 
 try:
     import fcntl

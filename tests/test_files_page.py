@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
-from qpsafe.sim.story_steps import StoryTable
+from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "files.md").read_text(encoding="utf-8")

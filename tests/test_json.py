@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 
 ROOT = Path(__file__).resolve().parents[1]
 HELPER = ROOT / "qpsafe" / "json_text.py"

@@ -10,13 +10,13 @@ import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_file
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.timing import Times
-    from qpsafe.timing_compile import Start
+    from qpsafe.bench.clock import Times
+    from qpsafe.bench.compilation import Start
 
 
 def bench(
@@ -35,9 +35,9 @@ def bench(
         _compilation(screen, out, json)
         return
     screen.print("Warming up (the first time, compiling the kernels takes about 15 s) ...", style="dim")
-    from qpsafe.timing import machine, time_rows
-    from qpsafe.timing_own import rows
-    from qpsafe.timing_peers import MINK, PINK, mink_row, pink_row
+    from qpsafe.bench.clock import machine, time_rows
+    from qpsafe.bench.ticks import rows
+    from qpsafe.bench.peers import MINK, PINK, mink_row, pink_row
 
     timed = {**rows(), MINK: mink_row()}
     pink = pink_row()
@@ -66,7 +66,7 @@ def show(times: dict[str, Times], machine: dict[str, str], screen: Console) -> N
 
 def _compilation(screen: Console, out: Path | None, json: bool) -> None:
     """What each kernel takes to compile, and to load."""
-    from qpsafe.timing_compile import time_compilation
+    from qpsafe.bench.compilation import time_compilation
 
     with progress_bar(screen) as progress:
         progress.add_task("compiling all kernels from an empty cache, in a process of its own", total=None)
@@ -90,7 +90,7 @@ def show_compilation(first: Start, later: Start, screen: Console) -> None:
 
 def _write(screen: Console, out: Path | None, json: bool, results: dict[str, Any]) -> None:
     """The results with the machine, in a file and on standard output where they are wanted."""
-    from qpsafe.timing import machine
+    from qpsafe.bench.clock import machine
 
     content = {"machine": machine(), "unit": "s", "results": results}
     if out is not None:

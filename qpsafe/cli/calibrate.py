@@ -164,7 +164,7 @@ def _plot(fits: list[Fit], path: Path) -> None:
 
     matplotlib.use("Agg")
     from qpsafe.sensing.calibration_plot import calibration_figure
-    from qpsafe.sim.plots import save
+    from qpsafe.sim.drawing.plots import save
 
     with matplotlib.rc_context({"savefig.dpi": 160}):
         save(calibration_figure(fits), path)

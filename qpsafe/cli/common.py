@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperGroup
 
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from qpsafe.laws.problem import Law
-    from qpsafe.sim.report import Check
+    from qpsafe.sim.experiments.shared.report import Check
 
 
 class LawName(StrEnum):

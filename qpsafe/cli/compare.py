@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar, verdict
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from qpsafe.laws.equivalence import Deviation
     from qpsafe.laws.problem import Law
-    from qpsafe.sim.compare import ClosedLoop
+    from qpsafe.sim.experiments.fixed.compare import ClosedLoop
 
 
 #: (random states, seconds of each whole run): the sample, which has the worst deviations of all, and all.
@@ -72,7 +72,7 @@ def compare(
             found[name] = compare_states(law, count, seed, limits, partial(_completed, progress, task))
         if closed_loop:
             from qpsafe.robot.loader import load_robot
-            from qpsafe.sim.compare import compare_closed_loop
+            from qpsafe.sim.experiments.fixed.compare import compare_closed_loop
 
             task = progress.add_task("whole runs", total=3 * round(duration / 0.004))
             loop = compare_closed_loop(load_robot("irb140"), duration, solver, lambda: progress.advance(task))

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import console, progress_bar, show_matrix, verdict
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.irc5_matrix import Result
+    from qpsafe.sim.irc5.fault_matrix import Result
 
 
 def irc5_faults(
@@ -28,7 +28,7 @@ def irc5_faults(
     """
     screen = console(json)
     from qpsafe.robot.loader import load_robot
-    from qpsafe.sim.irc5_matrix import run_faults
+    from qpsafe.sim.irc5.fault_matrix import run_faults
 
     with progress_bar(screen) as progress:
         task = progress.add_task(counted(moments, "moment"), total=moments)

@@ -15,13 +15,13 @@ from qpsafe.cli.common import SensorName, console, print_json, write_text
 from qpsafe.cli.outputs import output_file
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
-from qpsafe.json_text import json_text
-from qpsafe.words import counted
+from qpsafe.text.json_text import json_text
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.irc5_process import RobotRun
+    from qpsafe.sim.irc5.process import RobotRun
 
 
 def irc5_sim(
@@ -75,12 +75,12 @@ def irc5_sim(
     from qpsafe.irc5.axes import axes_of_robot
     from qpsafe.irc5.requests import Requests
     from qpsafe.robot.loader import load_robot
-    from qpsafe.sim.experiments import experiment_loop
-    from qpsafe.sim.irc5_link import WireFaults
-    from qpsafe.sim.irc5_loop import Irc5Loop
-    from qpsafe.sim.irc5_motion import EgmSettings
-    from qpsafe.sim.irc5_process import farewell, happenings, run_robot
-    from qpsafe.sim.irc5_udp import UdpExchange
+    from qpsafe.sim.experiments.by_name import experiment_loop
+    from qpsafe.sim.irc5.link import WireFaults
+    from qpsafe.sim.irc5.loop import Irc5Loop
+    from qpsafe.sim.irc5.motion import EgmSettings
+    from qpsafe.sim.irc5.process import farewell, happenings, run_robot
+    from qpsafe.sim.irc5.udp import UdpExchange
 
     settings = EgmSettings(
         gain=gain,

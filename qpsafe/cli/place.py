@@ -14,9 +14,9 @@ import typer
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 from qpsafe.placement.objective import Objective, check_request
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -72,8 +72,8 @@ def place(
     from qpsafe.placement.spots_toml import spots_toml
     from qpsafe.placement.study import study, to_dict
     from qpsafe.robot.loader import load_robot
-    from qpsafe.sim.placement_figures import figure_9
-    from qpsafe.sim.placement_run import MonteCarlo
+    from qpsafe.sim.placement.figures import figure_9
+    from qpsafe.sim.placement.run import MonteCarlo
 
     machine = load_robot(robot)
     with progress_bar(screen) as progress:
@@ -155,13 +155,13 @@ def _executor(workers: int) -> Iterator[Executor | None]:
 
 
 def _draw(machine: Any, found: Any, chosen: Any, out: Path, screen: Console) -> None:
-    from qpsafe.sim.gl import gl_available
+    from qpsafe.sim.drawing.gl import gl_available
 
     available, why = gl_available()
     if not available:
         screen.print(f"no pictures of the robot: {why}", style="yellow")
         return
-    from qpsafe.sim.placement_picture import save_picture
+    from qpsafe.sim.placement.picture import save_picture
 
     save_picture(out / "nodes.png", machine, found.nodes)
     save_picture(out / "spots.png", machine, found.nodes, chosen)

@@ -10,13 +10,13 @@ import typer
 
 from qpsafe.cli.common import console, print_json, progress_bar
 from qpsafe.cli.outputs import output_file
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.replay import Replay
-    from qpsafe.sim.run_file import RunFile
+    from qpsafe.sim.replay.replay import Replay
+    from qpsafe.sim.recording.run_file import RunFile
 
 
 def replay(
@@ -34,9 +34,9 @@ def replay(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.sim.replay import replay as run_again
-    from qpsafe.sim.run_file import read_run
-    from qpsafe.sim.settings import experiment_of
+    from qpsafe.sim.replay.replay import replay as run_again
+    from qpsafe.sim.recording.run_file import read_run
+    from qpsafe.sim.replay.settings import experiment_of
 
     run = read_run(file)
     experiment = experiment_of(run.header["settings"])
@@ -66,10 +66,10 @@ def _watchers(run: RunFile, experiment: Any, video: Path | None, view: bool, sta
     """What draws the recorded states."""
     from qpsafe.danger.activation import Activation
     from qpsafe.sensing.spots import load_spots
-    from qpsafe.sim.film import Film, Viewer
-    from qpsafe.sim.gl import gl_available
-    from qpsafe.sim.run_file import RunFileError
-    from qpsafe.sim.stage import Stage
+    from qpsafe.sim.drawing.film import Film, Viewer
+    from qpsafe.sim.drawing.gl import gl_available
+    from qpsafe.sim.recording.run_file import RunFileError
+    from qpsafe.sim.replay.stage import Stage
 
     stage = Stage(run, experiment)
     spots = load_spots(experiment.robot)

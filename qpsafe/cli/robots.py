@@ -10,7 +10,7 @@ import typer
 
 from qpsafe.cli.common import Group, console, print_json
 from qpsafe.cli.outputs import output_folder, try_folder
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

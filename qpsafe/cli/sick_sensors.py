@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import SensorName, console, progress_bar, show_matrix, verdict
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.sick import Result
+    from qpsafe.sim.sick.matrix import Result
 
 
 def sick_sensors(
@@ -30,8 +30,8 @@ def sick_sensors(
     """
     screen = console(json)
     from qpsafe.robot.loader import load_robot
-    from qpsafe.sim.fixed import FixedExperiment
-    from qpsafe.sim.sick import run_matrix
+    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+    from qpsafe.sim.sick.matrix import run_matrix
 
     with progress_bar(screen) as progress:
         task = progress.add_task(counted(moments, "moment"), total=None)

@@ -23,7 +23,7 @@ def story(
 
     Exit code 1 if it is wrong; the message names line, key and what was expected.
     """
-    from qpsafe.sim.story_file import load_story
+    from qpsafe.sim.stories.file import load_story
 
     screen, told = console(json), load_story(file)
     rows = [
@@ -32,7 +32,7 @@ def story(
         for step in actor.steps
     ]
     if plot is not None:
-        from qpsafe.sim.story_plots import plan_figure
+        from qpsafe.sim.drawing.stories import plan_figure
 
         plan_figure(told, plot)
     if json:

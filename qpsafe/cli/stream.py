@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from qpsafe.controller import SafetyController
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.realtime import Grant
-    from qpsafe.irc5.reference_log import ReferenceWriter
+    from qpsafe.irc5.records.log import ReferenceWriter
 
 
 class Experiment(StrEnum):
@@ -111,7 +111,7 @@ def stream(
         from qpsafe.irc5.streamer import EgmStreamer
         from qpsafe.irc5.warm_up import session_limits, warm_up
         from qpsafe.irc5.watchdog import Watchdog
-        from qpsafe.supervisor import Supervisor
+        from qpsafe.irc5.supervisor import Supervisor
 
         controller = _controller(robot, program, cell, experiment, make_law(law, projection))
         blind = not sensors or controller.sensing is None
@@ -170,7 +170,7 @@ def stream(
 
 
 def _writer(path: Path, joints: int) -> ReferenceWriter:
-    from qpsafe.irc5.reference_log import ReferenceWriter
+    from qpsafe.irc5.records.log import ReferenceWriter
 
     try:
         return ReferenceWriter(path, joints, beside=True)
@@ -195,7 +195,7 @@ def _controller(
             raise ConfigurationError(
                 "qpsafe stream", "--experiment", experiment.value, "no --program, no --cell with it"
             )
-        from qpsafe.sim.experiments import experiment_loop
+        from qpsafe.sim.experiments.by_name import experiment_loop
 
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.cli.stream_speaker import PERIOD, refused
-from qpsafe.words import counted, growth
+from qpsafe.text.words import counted, growth
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.loop import StreamLoop
     from qpsafe.irc5.realtime import Grant
-    from qpsafe.irc5.reference_log import ReferenceWriter
+    from qpsafe.irc5.records.log import ReferenceWriter
     from qpsafe.irc5.run import StreamRun
     from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.watchdog import Watchdog

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from qpsafe.irc5.inbox import REFUSALS
-from qpsafe.supervisor import State
+from qpsafe.irc5.supervisor import State
 
 if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from qpsafe.irc5.outlet import Outlet
     from qpsafe.irc5.run import StreamRun
     from qpsafe.irc5.streamer import EgmStreamer
-    from qpsafe.supervisor import Transition
+    from qpsafe.irc5.supervisor import Transition
 
 PERIOD = 0.004  # an answer that takes longer comes after the robot's next packet [s]
 PAUSE = 5  # seconds between two lines about what is waited for

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import Array, Vector, entry, inline, readable, row
+from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.compiled import rows
+from qpsafe.compiled.compiled import rows
 from qpsafe.danger.kernel import danger_field
 from qpsafe.danger.vector import danger_vectors
 from qpsafe.errors import ConfigurationError

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from qpsafe.danger import evasion, field, kernel, speed, vector
-from qpsafe.danger.compiled import Array, entry, inline, linked, readable
+from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.danger.evasion import act
 from qpsafe.danger.kernel import danger_field
 from qpsafe.danger.vector import vector_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import atan2, copysign, log, log1p, pi, sqrt
 
-from qpsafe.danger.compiled import Vector, add, cross, dot, inline, scale
+from qpsafe.compiled.compiled import Vector, add, cross, dot, inline, scale
 
 Four = tuple[float, float, float, float]
 # speed V0 + V1; by which these are divided: v0, v1, δ = v1 - v0, V0 = |v0|, V1 = |v1|; α = |δ|²; Dv; A

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numba import types
 
-from qpsafe.danger.compiled import Array, Vector, dot, entry, inline, readable, row, rows, scale
+from qpsafe.compiled.compiled import Array, Vector, dot, entry, inline, readable, row, rows, scale
 
 
 @inline

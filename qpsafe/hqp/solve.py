@@ -23,7 +23,7 @@ from qpsafe.hqp.solution import (
     STOPPED,
     Solution,
 )
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def _own(problem: Packed, begin: float, damping: Array | None = None, note: str 
     """Solve with the own solver."""
     global _solve_packed
     if _solve_packed is None:  # the first use: it brings numba
-        from qpsafe.hqp.own_solver import solve_packed
+        from qpsafe.hqp.own.solver import solve_packed
 
         _solve_packed, begin = solve_packed, perf_counter()
     qd, info = _solve_packed(*problem, damping)
@@ -130,15 +130,15 @@ def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
     qd: Array | None
     failures: list[int] = []
     if backend:
-        from qpsafe.hqp.cascade import solve_cascade
+        from qpsafe.hqp.backends.cascade import solve_cascade
 
         qd, turns, failures = solve_cascade(backend, levels, np.clip(np.zeros_like(box[0]), *box), *box)
     elif solver == "proxqp":
-        from qpsafe.hqp.native_proxqp import solve_proxqp
+        from qpsafe.hqp.backends.native_proxqp import solve_proxqp
 
         qd, turns, failures = solve_proxqp(levels, *box)
     else:
-        from qpsafe.hqp.native_daqp import solve_daqp
+        from qpsafe.hqp.backends.native_daqp import solve_daqp
 
         qd, turns = solve_daqp(levels, *box, problem.hard)
     if qd is None or failures:

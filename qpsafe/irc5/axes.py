@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

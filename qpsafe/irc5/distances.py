@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 

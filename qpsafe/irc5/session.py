@@ -17,7 +17,7 @@ from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from qpsafe.danger.compiled import inline
-from qpsafe.hqp.own_linear import Array
+from qpsafe.compiled.compiled import inline
+from qpsafe.hqp.own.linear import Array
 
 #: μ [s] where nothing else is said: ten ticks of 4 ms; see docs/laws.md.
 DAMPING_TIME = 0.04

@@ -78,7 +78,7 @@ class HierarchicalLaw(Fixed):
         self.projection = projection
         self.solver = solver
         if own:
-            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
+            import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
         self.damping, self.damping_time = float(damping), float(damping_time)
 
     def solve(self, problem: LawProblem) -> LawResult:
@@ -126,7 +126,7 @@ def weights_of(activations: Sequence[float]) -> list[float]:
 
 
 class BlendResult(LawResult):
-    """The law's answer from what [`solve_regimes`][qpsafe.hqp.own_regimes.solve_regimes] computed: the same bits.
+    """The law's answer from what [`solve_regimes`][qpsafe.hqp.own.regimes.solve_regimes] computed: the same bits.
 
     The regimes' solutions are made when they are looked at.
 

@@ -12,7 +12,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 
 class WeightedLaw(Fixed):
@@ -41,7 +41,7 @@ class WeightedLaw(Fixed):
         self.weights = None if weights is None else tuple(map(float, weights))
         self.solver = solver
         if solver in (None, "own"):
-            import qpsafe.hqp.own_solver  # noqa: F401  compile it now if need be, not within the first tick
+            import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""

@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, entry, readable
+from qpsafe.compiled.compiled import Array, entry, readable
 from qpsafe.placement.sample import Sample
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, add, cross, dot, entry, readable, row
+from qpsafe.compiled.compiled import Array, add, cross, dot, entry, readable, row
 
 #: Points that look the same way are no nearer to each other than this share of the spacing.
 NEAREST = 0.95

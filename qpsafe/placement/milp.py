@@ -26,7 +26,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.placement.coverage import Caps, Worth, detected_pairs, greedy, progress_of
 from qpsafe.placement.knapsack import check_spots
 from qpsafe.placement.sample import Sample
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
+from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
 
 #: The true maximum is no larger than (1 + TOLERANCE) times the value returned.
 TOLERANCE = 1e-3

@@ -8,7 +8,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from qpsafe.json_text import json_text
+from qpsafe.text.json_text import json_text
 from qpsafe.placement.candidates import Candidates
 
 

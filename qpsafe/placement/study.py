@@ -16,7 +16,7 @@ from qpsafe.placement.milp import Solution, best_choice, least_spots
 from qpsafe.placement.objective import Objective
 from qpsafe.placement.sample import Sample
 from qpsafe.placement.statistics import clopper_pearson
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 

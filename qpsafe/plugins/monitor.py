@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.checks import checked_dt, checked_evasion, checked_field, checked_robot
+from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot
 from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.barrier import DangerBarrier
+from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.errors import ConfigurationError
 from qpsafe.plugins.joints import JointMap
 from qpsafe.plugins.monitor import DangerMonitor

@@ -14,8 +14,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, entry, inline
-from qpsafe.danger.memory import view
+from qpsafe.compiled.compiled import Array, entry, inline
+from qpsafe.compiled.memory import view
 
 Index = NDArray[np.int64]
 

@@ -19,7 +19,7 @@ from qpsafe.robot.mjcf import ENDLESS
 from qpsafe.robot.spec import HeldJoint, Region, RobotSpec, Tool
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 _FLOAT = np.dtype(np.float64)
 

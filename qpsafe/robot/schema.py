@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from qpsafe.errors import RobotFileError
-from qpsafe.tasks.toml_parse import read_bounded, toml_table
-from qpsafe.words import counted
+from qpsafe.text.toml_parse import read_bounded, toml_table
+from qpsafe.text.words import counted
 
 Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]

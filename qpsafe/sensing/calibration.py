@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.sensing.sharp import SharpConverter, SharpCurve
-from qpsafe.tasks.toml_parse import read_bounded, toml_table
-from qpsafe.words import counted
+from qpsafe.text.toml_parse import read_bounded, toml_table
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

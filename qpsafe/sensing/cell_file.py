@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.hulls import Obstacle
-from qpsafe.tasks.toml_text import TomlText
+from qpsafe.text.toml_text import TomlText
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]

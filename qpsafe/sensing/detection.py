@@ -10,8 +10,8 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger import compiled
-from qpsafe.danger.compiled import Array, Vector, add, dot, entry, inline, readable, row
+from qpsafe.compiled import compiled
+from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Array, Vector, inline
+from qpsafe.compiled.compiled import Array, Vector, inline
 from qpsafe.sensing.rules import SensingRules
 
 HEALTHY, NOT_A_NUMBER, BELOW_ZERO, STALE, STUCK, IMPOSSIBLE_AGE = range(6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from qpsafe.danger.compiled import Array, Vector, add, dot, inline, row
+from qpsafe.compiled.compiled import Array, Vector, add, dot, inline, row
 from qpsafe.fixed import Fixed
 from qpsafe.sensing.rules import SensingRules
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from qpsafe.danger.compiled import Array, add, entry, readable
-from qpsafe.danger.memory import view
+from qpsafe.compiled.compiled import Array, add, entry, readable
+from qpsafe.compiled.memory import view
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
 from qpsafe.sensing import health, hold, hulls, spots, velocity

@@ -19,7 +19,7 @@ from qpsafe.sensing.kernel import take_readings
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.sensing.velocity import ApproachVelocity
-from qpsafe.words import counted
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

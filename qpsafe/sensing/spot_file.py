@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from qpsafe.errors import RobotFileError
 from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.spots import Spot
-from qpsafe.tasks.toml_parse import read_bounded, toml_table
+from qpsafe.text.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

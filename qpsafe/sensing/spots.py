@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.compiled import Vector, entry, inline
+from qpsafe.compiled.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:

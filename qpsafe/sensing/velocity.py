@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from qpsafe.danger.compiled import Array, Vector, inline
+from qpsafe.compiled.compiled import Array, Vector, inline
 from qpsafe.fixed import Fixed
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import qpsafe
 from qpsafe.cli.stream import _controller
-from qpsafe.tasks.lines import line_of
+from qpsafe.text.lines import line_of
 from qpsafe.tasks.program_file import ProgramError, load_program
 
 robot = qpsafe.load_robot("irb140")

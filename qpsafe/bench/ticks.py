@@ -1,0 +1,108 @@
+"""What of the project is timed: the whole tick in its kinds, and its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from qpsafe.controller import SafetyController
+from qpsafe.danger.field import DangerField
+from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.nullspace import NullspaceLaw
+from qpsafe.laws.problem import Law
+from qpsafe.laws.weighted import WeightedLaw
+from qpsafe.robot.loader import load_robot
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.spots import load_spots
+from qpsafe.tasks.orientation import OrientationTask
+from qpsafe.tasks.position import PositionTask
+from qpsafe.tasks.trajectory import FixedPose
+from qpsafe.bench.clock import Row
+
+#: What a robot with its own sensors runs; everything else is beside it.
+MAIN = "whole tick, 20 distances"
+
+
+def rows() -> dict[str, Row]:
+    """All of it. The hierarchical law is strict where nothing else is said."""
+    return {
+        MAIN: Row(ticks(HierarchicalLaw())),
+        f"{MAIN}, garbage collector on": Row(ticks(HierarchicalLaw()), "on"),
+        f"{MAIN}, collector on after gc.freeze": Row(ticks(HierarchicalLaw()), "frozen"),
+        "whole tick, 20 points given": Row(ticks(HierarchicalLaw(), points=True)),
+        f"{MAIN}, a task of one's own": Row(ticks(HierarchicalLaw(), task=OwnTask)),
+        f"{MAIN}, paper's projection": Row(ticks(HierarchicalLaw("paper"))),
+        f"{MAIN}, weighted law": Row(ticks(WeightedLaw())),
+        f"{MAIN}, null-space law": Row(ticks(NullspaceLaw())),
+        "danger field, 20 points x 6 links": Row(danger_field()),
+        "sensing, 20 spots, all filters": Row(sensing()),
+    }
+
+
+class OwnTask(PositionTask):
+    """A task of three rows of somebody's own making: asked method by method, in Python."""
+
+    def error(self, value: np.ndarray, sample: Any) -> np.ndarray:
+        """Like its parent's; but that is not known to compiled code."""
+        return super().error(value, sample)
+
+
+def danger_field() -> Callable[[int], Any]:
+    """Value and gradient at 20 points around the moving IRB 140 (6 links)."""
+    robot, rng, field = load_robot("irb140"), np.random.default_rng(0), DangerField()
+    wire = robot.wire(robot.home, rng.normal(size=6))
+    points = rng.uniform(-1.0, 1.0, (20, 3)) + np.array([0.3, 0.0, 0.6])
+    return lambda _: field.evaluate(points, wire)
+
+
+def sensing() -> Callable[[int], Any]:
+    """From 20 readings to the points that count: the IRB 140 with a known floor and table, all filters on.
+
+    The readings sweep slowly, with noise; two spots are sick now and then. The kinematics of the tick are not included.
+    """
+    robot, rng = load_robot("irb140"), np.random.default_rng(0)
+    spots = load_spots(robot)
+    assert spots is not None
+    known = (Obstacle.box("floor", (6, 6, 0.5), (0, 0, -0.8)), Obstacle.box("table", (0.6, 1.0, 0.05), (0.8, 0, 0.3)))
+    sensors = DistanceSensing(robot, spots, 0.004, SensingRules(velocities=True), known)
+    state, wire = robot.at(robot.home), robot.wire(robot.home, np.zeros(6))
+    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(500) / 500.0)
+    readings = sweep[:, None] + rng.normal(0.0, 0.003, (500, len(spots)))
+    readings[::50, :2] = np.nan
+    return lambda k: sensors.update(state, wire, readings[k % 500])
+
+
+def ticks(law: Law, *, points: bool = False, task: type[PositionTask] = PositionTask) -> Callable[[int], Any]:
+    """`SafetyController.step` of the IRB 140 with all 20 spots detecting, through medium and high danger and back.
+
+    The distances sweep slowly from 0.76 m to 0.32 m and back; the path is suspended and the robot recovers. It follows
+    its references exactly.
+
+    Args:
+        law: The law.
+        points: Give the detected points themselves: everything but what is done to raw sensor readings.
+        task: Of the position.
+    """
+    robot = load_robot("irb140")
+    target = FixedPose(robot.pose("tcp", robot.home))
+    controller = SafetyController(robot, [task("tcp", target), OrientationTask("tcp", target)], law)
+    assert controller.spots is not None
+    offsets = np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))
+    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
+    distances, home = [d + offsets for d in sweep], robot.at(robot.home)
+    given = [controller.spots.points(home, d) for d in distances] if points else distances
+    state = [np.array(robot.home), np.zeros(6)]
+
+    def tick(k: int) -> None:
+        reference = (
+            controller.step(state[0], state[1], points=given[k % 2500])
+            if points
+            else controller.step(state[0], state[1], given[k % 2500])
+        ).reference
+        state[:] = reference.q, reference.qd
+
+    return tick

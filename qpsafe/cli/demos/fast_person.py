@@ -1,0 +1,101 @@
+"""`qpsafe demo fast-person`: somebody walks straight at the robot; contact or not, as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, verdict, write_text
+from qpsafe.cli.outputs import output_folder
+from qpsafe.text.json_text import json_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.sim.experiments.fast_person import FastRun
+
+
+def fast_person(
+    speed: Annotated[
+        list[float] | None, typer.Option(min=0.5, max=2.0, help="Walking speed [m/s]; several are allowed.")
+    ] = None,
+    experiment: Annotated[list[str] | None, typer.Option(help="Only this experiment; several are allowed.")] = None,
+    law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
+    projection: Annotated[ProjectionName, typer.Option(help="Of the hierarchical law.")] = ProjectionName.strict,
+    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s].")] = 0.0,
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
+        "out/demo-fast-person"
+    ),
+    video: Annotated[bool, typer.Option(help="Write an mp4 of every run.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the runs in MuJoCo's viewer; needs a display.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the table as JSON to standard output.")] = False,
+) -> None:
+    """Somebody walks straight at the robot and only its pedestal stops them: contact or not, and how fast it was.
+
+    A report, not a promise: the exit code is 0 whatever happens, 1 if a run could not be made.
+    """
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.errors import ConfigurationError
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.experiments.fast_person import EXPERIMENTS, SPEEDS, fast_figure, runs
+    from qpsafe.sim.recording.run_file import StateRecorder, write_run
+    from qpsafe.sim.replay.settings import settings_of
+
+    names = tuple(experiment or EXPERIMENTS)
+    for name in names:
+        if name not in EXPERIMENTS:
+            raise ConfigurationError("demo fast-person", "--experiment", name, "one of " + ", ".join(EXPERIMENTS))
+    robot = load_robot("irb140")
+    out.mkdir(parents=True, exist_ok=True)
+    found: list[FastRun] = []
+    states = StateRecorder()
+    with progress_bar(screen) as progress:
+
+        @contextmanager
+        def watched(name: str, speed: float, built: Any) -> Iterator[Any]:
+            nonlocal states
+            states, label = StateRecorder(), f"{name}, {speed:g} m/s"
+            file = out / f"video-{name}-{speed:g}.mp4"
+            with observed(built, file, video, view, screen, progress, label, states) as (observe, _):
+                yield observe
+
+        for run in runs(robot, make_law(law, projection), tuple(speed or SPEEDS), names, lag, watched):
+            found.append(run)
+            file = out / f"run-{run.experiment}-{run.speed:g}.npz"
+            write_run(file, run.log, settings_of(run.built), robot, states)
+    rows = [run.to_dict() for run in found]
+    write_text(out / "table.json", json_text(rows) + "\n")
+    fast_figure(found, out / "figure.png")
+    if json:
+        print_json(rows)
+    else:
+        show(found, screen)
+        screen.print(f"written to {out}: figure.png, table.json, run-*.npz")
+
+
+def show(found: list[FastRun], screen: Console) -> None:
+    """Print the table."""
+    from qpsafe.cli.sheet import Sheet
+
+    numbers = ("at [s]", "least gap [mm]", "robot then [m/s]", "closing [m/s]", "moving in contact [s]", "CDF_n")
+    sheet = Sheet("Somebody walks straight at the robot", ("run", "walks [m/s]", "contact", *numbers))
+    for run in found:
+        e = run.encounter
+        sheet.add_row(
+            run.experiment,
+            f"{run.speed:.1f}",
+            verdict(e.contact is None, "no", "yes"),
+            f"{e.time if e.contact is None else e.contact:.2f}",
+            f"{1e3 * e.distance:.0f}",
+            f"{e.robot_speed:.3f}",
+            f"{e.closing_speed:.2f}",
+            f"{e.moving_contact:.2f}",
+            f"{e.danger:.0f}",
+        )
+    screen.print(sheet)

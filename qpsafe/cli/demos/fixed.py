@@ -1,0 +1,263 @@
+"""`qpsafe demo`: the source's experiments in MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import (
+    Group,
+    LawName,
+    ProjectionName,
+    SensorName,
+    console,
+    make_law,
+    print_json,
+    progress_bar,
+    show_checks,
+    write_text,
+)
+from qpsafe.cli.demos.fast_person import fast_person
+from qpsafe.cli.demos.path import path
+from qpsafe.cli.demos.pick_and_place import pick_and_place
+from qpsafe.cli.outputs import output_folder
+from qpsafe.errors import ConfigurationError
+from qpsafe.text.json_text import json_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, Observer
+    from qpsafe.sim.recording.log import RunLog
+    from qpsafe.sim.experiments.shared.report import Report
+    from qpsafe.sim.recording.run_file import StateRecorder
+
+app = typer.Typer(cls=Group, help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
+
+
+@app.command()
+def fixed(
+    robot: Annotated[
+        str, typer.Option(help="A bundled robot, a robot folder with spots, or 'all': one table over all bundled ones.")
+    ] = "irb140",
+    law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
+    projection: Annotated[
+        ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
+    ] = ProjectionName.strict,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    lag: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(min=0.1, max=600.0, help="Length of the run [s]; 60, or the story's.")
+    ] = None,
+    sensor: Annotated[
+        SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
+    ] = SensorName.ideal,
+    cap: Annotated[
+        float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default it is not.")
+    ] = None,
+    spots: Annotated[
+        str | None, typer.Option(help="Other sensors: a file in the robot's folder, as spots-by-hand.toml, or a path.")
+    ] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the source's.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
+    video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
+    view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """First experiment: keep a fixed tool pose while a person with a card board comes from three sides."""
+    from qpsafe.cli.demos.all_robots import every_robot
+
+    screen = console(json)
+    if spots is not None and robot == "all":
+        raise ConfigurationError("qpsafe demo fixed", "spots", spots, "one robot, not 'all': sensors fit one robot")
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.experiments.encounter import encounter
+    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+    from qpsafe.sim.experiments.fixed.stage import robot_stage
+    from qpsafe.sim.stories.file import load_story
+
+    def make(name: str) -> FixedExperiment:
+        chosen = load_robot(name) if spots is None else load_robot(name).with_spots(spots)
+        told = None if story is None else load_story(story, floor=-robot_stage(chosen).pedestal)
+        return FixedExperiment(
+            chosen,
+            make_law(law, projection, solver),
+            seed=seed,
+            lag=lag,
+            duration=duration or (60.0 if told is None else told.duration),
+            story=told,
+            sensor=sensor.value,
+            cap=cap,
+        )
+
+    title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
+    if robot == "all":
+
+        def run(experiment: FixedExperiment, folder: Path) -> Report:
+            return _once(experiment, title, folder, video, view, screen)[0]
+
+        kept = every_robot(make, run, out, json, screen)
+    else:
+        experiment = make(robot)
+        report, log, files = _once(experiment, title, out, video, view, screen)
+        kept, near = report.kept, encounter(log, experiment.robot)
+        if json:
+            print_json(report.to_dict() | {"encounter": near.to_dict()})
+        else:
+            show(report, title, screen)
+            if story is not None:
+                screen.print(near.sentence())
+            screen.print(f"written to {out}: {', '.join(files)}")
+    if not kept:
+        raise typer.Exit(1)
+
+
+def _once(
+    experiment: FixedExperiment, title: str, out: Path, video: bool, view: bool, screen: Console
+) -> tuple[Report, RunLog, list[str]]:
+    """One run with its files."""
+    out.mkdir(parents=True, exist_ok=True)
+    files = ["signals.csv", "figure.png", "distance.png", "report.json", "run.npz"]
+    log, filmed = _run(experiment, out, video, view, screen)
+    if filmed:
+        files.append("video.mp4")
+    return _write(experiment, log, title, out), log, files
+
+
+def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen: Console) -> tuple[RunLog, bool]:
+    """Run with a progress bar, filmed if possible, and write the run's file."""
+    from qpsafe.sim.recording.run_file import StateRecorder, write_run
+    from qpsafe.sim.replay.settings import settings_of
+
+    label, states = f"{experiment.robot.name}, {experiment.duration:g} s, 250 Hz", StateRecorder()
+    with (
+        progress_bar(screen) as progress,
+        observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, filmed),
+    ):
+        log = experiment.run(observer)
+    write_run(out / "run.npz", log, settings_of(experiment), experiment.robot, states)
+    return log, filmed
+
+
+@contextmanager
+def observed(
+    experiment: FixedExperiment,
+    path: Path,
+    video: bool,
+    view: bool,
+    screen: Console,
+    progress: Progress,
+    label: str,
+    states: StateRecorder | None = None,
+) -> Iterator[tuple[Observer, bool]]:
+    """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not."""
+    from qpsafe.danger.thresholds import robot_activation
+    from qpsafe.errors import MissingExtraError
+    from qpsafe.sensing.spots import load_spots
+    from qpsafe.sim.drawing.film import Film, Viewer
+    from qpsafe.sim.drawing.gl import gl_available
+
+    spots = load_spots(experiment.robot)
+    assert spots is not None
+    activation = robot_activation(experiment.robot)
+    with ExitStack() as stack:
+        observers: list[Any] = [] if states is None else [states.observe]
+        filmed = False
+        if video and not view:
+            available, reason = gl_available()
+            try:
+                if available:
+                    film = Film(path, experiment.scene, spots, activation)
+                    observers.append(stack.enter_context(film).observe)
+                    filmed = True
+            except MissingExtraError as error:
+                available, reason = False, str(error)
+            if not available:
+                screen.print(f"no video: {reason}", style="yellow")
+        if view:
+            viewer = Viewer(experiment.scene, spots, activation)
+            stack.callback(viewer.close)
+            observers.append(viewer.observe)
+        task = progress.add_task(label, total=round(experiment.duration / 0.004))
+
+        def observe(*state: Any) -> None:
+            for observer in observers:
+                observer(*state)
+            progress.advance(task)
+
+        yield observe, filmed
+
+
+def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> Report:
+    """Write csv, figures and report, each whole or not at all."""
+    from qpsafe.danger.thresholds import robot_activation
+    from qpsafe.sim.drawing.plots import distance_figure, figure_11
+    from qpsafe.sim.experiments.shared.report import summarise
+    from qpsafe.sim.drawing.stories import encounter_figure
+
+    without = experiment.board_distance_without_controller()
+    report = summarise(log, without, experiment.walk.windows, experiment.robot)
+    log.write_csv(out / "signals.csv")
+    activation = robot_activation(experiment.robot)
+    figure_11(log, out / "figure.png", f"First experiment, {experiment.robot.name}, {title}", activation)
+    if experiment.story is None:
+        distance_figure(log, without, out / "distance.png")
+    else:
+        encounter_figure(log, out / "distance.png")
+    write_text(out / "report.json", json_text(report.to_dict()) + "\n")
+    return report
+
+
+def show(report: Report, title: str, screen: Console) -> None:
+    """Print the report as tables."""
+    from rich.text import Text
+
+    from qpsafe.cli.sheet import Sheet
+
+    sheet = Sheet(
+        f"First experiment, {title}: largest errors in each regime, commanded and measured pose",
+        ("danger", "from, s", "to, s", "CDF_n", "error, mm", "error, rad", "meas., mm", "meas., rad"),
+    )
+    colours = {"low": "green", "medium": "yellow", "high": "red"}
+    for row in report.regimes:
+        sheet.add_row(
+            Text(row.regime, colours.get(row.regime, "")),
+            f"{row.entered:.2f}",
+            f"{row.left:.2f}",
+            f"{row.cdf_n:.2f}",
+            f"{1e3 * row.position_error:.3f}",
+            f"{row.orientation_error:.4f}",
+            f"{1e3 * row.measured_position_error:.3f}",
+            f"{row.measured_orientation_error:.4f}",
+        )
+    screen.print(sheet)
+
+    if report.approaches:
+        headings = ("approach [s]", "with controller [m]", "without [m]", "gained [m]")
+        sheet = Sheet("Smallest true distance between robot and board", headings, text=())
+        for approach in report.approaches:
+            gained = approach.with_controller - approach.without_controller
+            numbers = (approach.with_controller, approach.without_controller, gained)
+            sheet.add_row(f"{approach.start:.1f} to {approach.end:.1f}", *(f"{value:.3f}" for value in numbers))
+        screen.print(sheet)
+
+    show_checks("What the run should show", report.checks, screen, report.left_out)
+    position, orientation = report.tracking
+    screen.print(
+        f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "
+        f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else "")
+    )
+
+
+app.command()(path)
+app.command("fast-person")(fast_person)
+app.command("pick-and-place")(pick_and_place)

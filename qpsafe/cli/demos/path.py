@@ -1,0 +1,145 @@
+"""`qpsafe demo path`: the second experiment with three laws side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.common import console, print_json, progress_bar, show_checks, write_text
+from qpsafe.cli.outputs import output_folder
+from qpsafe.text.json_text import json_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.laws.problem import Law
+    from qpsafe.sim.experiments.path.report import PathFigures
+    from qpsafe.sim.experiments.shared.report import Check
+
+
+def path(
+    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    lag: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(min=3.0, max=600.0, help="Length of each run [s]; 45, or the story's.")
+    ] = None,
+    program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the bundled.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-path"),
+    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Second experiment: follow a line back and forth while a person with a card board comes and goes.
+
+    Four runs: the hierarchical law (strict, and with the source's projection), the null-space law, and strict without
+    suspension and recovery.
+    """
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.laws.hierarchical import HierarchicalLaw
+    from qpsafe.laws.nullspace import NullspaceLaw
+    from qpsafe.recovery.recovery import RecoveryRules
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.experiments.encounter import encounter
+    from qpsafe.sim.experiments.path.experiment import PROGRAM, PathExperiment
+    from qpsafe.sim.experiments.path.plots import side_by_side
+    from qpsafe.sim.experiments.path.report import figures, promises, to_dict
+    from qpsafe.sim.drawing.plots import figure_11
+    from qpsafe.sim.recording.run_file import StateRecorder, write_run
+    from qpsafe.sim.replay.settings import settings_of
+    from qpsafe.sim.stories.file import load_story
+
+    told = None if story is None else load_story(story)
+    length = duration or (45.0 if told is None else told.duration)
+    robot, strict = load_robot("irb140"), HierarchicalLaw(solver=solver)
+    laws: dict[str, Law] = {
+        "strict": strict,
+        "paper": HierarchicalLaw("paper", solver=solver),
+        "nullspace": NullspaceLaw(),
+        "strict, no recovery": strict,
+    }
+    experiments = {
+        name: PathExperiment(
+            robot,
+            law,
+            seed=seed,
+            lag=lag,
+            duration=length,
+            story=told,
+            recovery=RecoveryRules(enabled="no recovery" not in name),
+            program=PROGRAM if program is None else program,
+        )
+        for name, law in laws.items()
+    }
+    first = experiments["strict"]
+    cycle = first.reference.duration  # a wrong program is refused before anything is written or run
+    screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim")
+    out.mkdir(parents=True, exist_ok=True)
+    runs, found, near = {}, {}, {}
+    with progress_bar(screen) as progress:
+        for name, experiment in experiments.items():
+            shown, states = (video and name == "strict", view and name == "strict"), StateRecorder()
+            with observed(experiment, out / "video.mp4", *shown, screen, progress, name, states) as (observer, _):
+                runs[name] = experiment.run_path(observer)
+            found[name] = figures(runs[name], robot)
+            near[name] = encounter(runs[name].log, robot)
+            tag = name.replace(", ", "-").replace(" ", "-")
+            runs[name].log.write_csv(out / f"signals-{tag}.csv")
+            write_run(out / f"run-{tag}.npz", runs[name].log, settings_of(experiment), robot, states)
+    others = {name: found[name] for name in ("paper", "nullspace")}
+    checks, left_out = promises(found["strict"], found["strict, no recovery"], others)
+    if told is not None:  # the other promises are about the bundled people
+        checks, left_out = [check for check in checks if "largest step" in check.name], []
+    result = to_dict(found, checks, left_out) | {"encounters": {name: item.to_dict() for name, item in near.items()}}
+    figure_11(runs["strict"].log, out / "figure.png", "Second experiment, hierarchical law, strict projection")
+    side_by_side({name: run for name, run in runs.items() if "," not in name}, robot, out / "side-by-side.png")
+    write_text(out / "report.json", json_text(result) + "\n")
+    if json:
+        print_json(result)
+    else:
+        show(found, checks, left_out, screen)
+        if told is not None:
+            for name, item in near.items():
+                screen.print(f"{name}: {item.sentence()}")
+        files = "figure.png, side-by-side.png, report.json, signals-*.csv, run-*.npz"
+        screen.print(f"written to {out}: {files}")
+    if not result["kept"]:
+        raise typer.Exit(1)
+
+
+def show(found: dict[str, PathFigures], checks: list[Check], left_out: list[str], screen: Console) -> None:
+    """Print figures and promises as tables."""
+    from qpsafe.cli.sheet import Sheet
+
+    def shown(value: float | None, form: str, size: float = 1.0) -> str:
+        return "-" if value is None else format(size * value, form)
+
+    rows: list[tuple[str, Any]] = [
+        (
+            "on the line, low danger, constant speed: orientation error [rad]",
+            lambda f: shown(f.line_orientation, ".2g"),
+        ),
+        ("... position error [mm]", lambda f: shown(f.line_position, ".3f", 1e3)),
+        ("along the line, medium danger: position error [mm]", lambda f: shown(f.medium_position, ".3f", 1e3)),
+        ("largest step of q̇ [a_max dt]", lambda f: f"{f.step:.6f}"),
+        ("ticks clipped to the limits", lambda f: str(f.clipped)),
+        ("on the way back: joint speed [limit]", lambda f: shown(f.return_speed, ".3f")),
+        ("... joint acceleration [limit]", lambda f: shown(f.return_acceleration, ".3f")),
+        ("... joint speed, evasion braked [limit]", lambda f: shown(f.smooth_speed, ".3f")),
+        ("... joint acceleration, evasion braked [limit]", lambda f: shown(f.smooth_acceleration, ".3f")),
+        ("path goes on at [mm] from where it stopped", lambda f: shown(f.resumed, ".3f", 1e3)),
+        ("suspensions", lambda f: str(f.suspensions)),
+        ("path travelled [s]", lambda f: f"{f.travelled:.2f}"),
+    ]
+    sheet = Sheet("Second experiment: largest figures of each run", ("", *found))
+    for label, text in rows:
+        sheet.add_row(label, *(text(item) for item in found.values()))
+    screen.print(sheet)
+    show_checks("What the runs should show", checks, screen, left_out)

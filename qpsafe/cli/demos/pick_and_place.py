@@ -1,0 +1,176 @@
+"""`qpsafe demo pick-and-place`: the third experiment, one day in pictures or many in numbers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpsafe.cli.common import (
+    LawName,
+    ProjectionName,
+    SensorName,
+    console,
+    make_law,
+    print_json,
+    progress_bar,
+    show_checks,
+    write_text,
+)
+from qpsafe.cli.outputs import output_folder
+from qpsafe.text.json_text import json_text
+from qpsafe.text.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.console import Console
+
+    from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment, PickRun
+    from qpsafe.sim.experiments.pick_place.report import PickFigures
+    from qpsafe.sim.experiments.shared.report import Check
+
+
+def pick_and_place(
+    seed: Annotated[int, typer.Option(min=0, help="Varies where, when and how fast people go; 0 is nominal.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="Run so many seeds, from --seed on, and print the spread.")] = 1,
+    cycles: Annotated[int, typer.Option(min=1, max=100, help="Screws to carry in each run.")] = 10,
+    people: Annotated[Path | None, typer.Option(help="TOML file of the people; by default two.")] = None,
+    program: Annotated[Path | None, typer.Option(help="TOML file of what the tool does.")] = None,
+    lag: Annotated[
+        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+    ] = 0.0,
+    law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
+    projection: Annotated[
+        ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
+    ] = ProjectionName.strict,
+    solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
+    sensor: Annotated[
+        SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
+    ] = SensorName.ideal,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
+        "out/demo-pick-and-place"
+    ),
+    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Third experiment: carry screws from a support into a box while two people take screws and bring new ones.
+
+    The first seed runs in full, with snapshots, figure and csv; further seeds and the run without people give the cost.
+    """
+    screen = console(json)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.experiments.pick_place.cell import PROGRAM
+    from qpsafe.sim.experiments.pick_place.experiment import PEOPLE, PickPlaceExperiment
+    from qpsafe.sim.experiments.pick_place.plots import seeds_figure
+    from qpsafe.sim.experiments.pick_place.report import figures, promises, to_dict
+    from qpsafe.sim.experiments.pick_place.seeds import run_seeds
+
+    experiment = PickPlaceExperiment(
+        load_robot("irb140"),
+        make_law(law, projection, solver),
+        seed=seed,
+        cycles=cycles,
+        people_file=PEOPLE if people is None else people,
+        program=PROGRAM if program is None else program,
+        lag=lag,
+        sensor=sensor.value,
+    )
+    # wrong files are refused before anything is written or run
+    length = experiment.reference.duration / len(experiment.cell.holes)
+    names = [person.name for person in experiment.people]
+    screen.print(f"a cycle takes {length:.1f} s by the program; {' and '.join(names)} come", style="dim")
+    out.mkdir(parents=True, exist_ok=True)
+    with progress_bar(screen) as progress:
+        run = _first(experiment, out, video, view, screen, progress)
+        others: list[int | None] = [None, *range(seed + 1, seed + seeds)]
+        task = progress.add_task("without people" + (f", and seeds to {others[-1]}" if seeds > 1 else ""), total=seeds)
+        found = run_seeds(experiment, others, jobs, lambda count: progress.update(task, completed=count))
+    alone, runs = found[0], [figures(run, seed), *found[1:]]
+    checks = promises(runs, alone, cycles)
+    result = to_dict(runs, alone, checks)
+    files = _write(experiment, run, out, screen)
+    if seeds > 1:
+        seeds_figure(runs, alone, out / "seeds.png")
+        files.append("seeds.png")
+    write_text(out / "report.json", json_text(result) + "\n")
+    if json:
+        print_json(result)
+    else:
+        show(runs, alone, checks, screen)
+        screen.print(f"written to {out}: {', '.join([*files, 'report.json'])}")
+    if not result["kept"]:
+        raise typer.Exit(1)
+
+
+def _first(
+    experiment: PickPlaceExperiment, out: Path, video: bool, view: bool, screen: Console, progress: object
+) -> PickRun:
+    """The run that is shown, filmed if wanted."""
+    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.sim.recording.run_file import StateRecorder, write_run
+    from qpsafe.sim.replay.settings import settings_of
+
+    label, states = f"seed {experiment.seed}, 250 Hz", StateRecorder()
+    with observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, _):  # type: ignore[arg-type]
+        run = experiment.run(observer)
+    write_run(out / "run.npz", run.log, settings_of(experiment), experiment.robot, states)
+    return run
+
+
+def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Console) -> list[str]:
+    """Write csv, figure and snapshots, each whole or not at all; returns their names."""
+    from qpsafe.sim.drawing.gl import gl_available
+    from qpsafe.sim.experiments.pick_place.plots import timeline
+    from qpsafe.sim.experiments.pick_place.snapshots import draw
+
+    run.log.write_csv(out / "signals.csv")
+    names = [person.name for person in experiment.people]
+    timeline(run, names, out / "figure.png", f"Third experiment, seed {experiment.seed}")
+    files = ["signals.csv", "figure.png", "run.npz"]
+    available, reason = gl_available()
+    if not available:
+        screen.print(f"no snapshots: {reason}", style="yellow")
+    elif draw(experiment, run, out / "snapshots.png"):
+        files.append("snapshots.png")
+    return files
+
+
+def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check], screen: Console) -> None:
+    """Print figures and promises as tables."""
+    from qpsafe.cli.sheet import Sheet
+    from qpsafe.sim.experiments.pick_place.report import cost, spread
+
+    counts = ("delivered", "missed", "lost", "taken", "placed")
+    sheet = Sheet("Third experiment: screws", ("seed", *counts, "all cycles, s", "cost, s/cycle"))
+    for item in (alone, *runs):
+        numbers = (item.delivered, item.missed, item.lost, item.taken, item.placed)
+        extra = "-" if item is alone else f"{cost(item, alone):.2f}"
+        sheet.add_row(_seed(item, alone), *map(str, numbers), f"{item.duration:.1f}", extra)
+    screen.print(sheet)
+    headings = ("seed", "nearest, m", "moving, m", "contacts", "tables, mm", "suspended", "largest CDF_n")
+    sheet = Sheet("Third experiment: safety", headings)
+    for item in (alone, *runs):
+        gaps = ("-" if item is alone else f"{value:.3f}" for value in (item.nearest, item.nearest_moving))
+        rest = (str(item.contacts), f"{1e3 * item.clearance:.1f}", str(item.suspensions), f"{item.danger:.1f}")
+        sheet.add_row(_seed(item, alone), *gaps, *rest)
+    screen.print(sheet)
+    costs = spread([cost(item, alone) for item in runs])
+    cycle = alone.duration / max(len(alone.cycle_times), 1)
+    text = f"a cycle takes {cycle:.2f} s without people; with them it costs {costs['median']:.2f} s more"
+    if len(runs) > 1:
+        text += (
+            f" (median of {counted(len(runs), 'seed')}; quartiles {costs['quartile_1']:.2f} and "
+            f"{costs['quartile_3']:.2f}, range {costs['smallest']:.2f} to {costs['largest']:.2f})"
+        )
+    screen.print(text)
+    show_checks("What the runs should show", checks, screen)
+
+
+def _seed(item: PickFigures, alone: PickFigures) -> str:
+    return "nobody" if item is alone else str(item.seed)

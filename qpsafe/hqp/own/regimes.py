@@ -1,0 +1,100 @@
+"""All regimes of a blend in one call: the own solver on the hierarchies that keep the first 0, 1, ... tasks.
+
+    q̇ = Σ_k w_k q̇_k,   q̇_k = [J_1 q̇ = ẋ_1 ≻ ... ≻ J_k q̇ = ẋ_k ≻ min ||q̇ - q̇0||²],   each within the same limits
+
+Every q̇_k has the bits that `solve_hierarchy` gives it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.compiled.compiled import inline
+from qpsafe.compiled.memory import view
+from qpsafe.hqp.own.hierarchy import HEADER
+from qpsafe.hqp.own.solver import solve_compiled as solve
+from qpsafe.hqp.own.state import floats_of, workspace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_count_floats = inline(floats_of)
+
+
+@inline
+def solve_regimes(
+    floats: Array, integers: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index, A: Array, b: Array,
+    weights: Array, qd0: Array, lower: Array, upper: Array, damping: Array, x: Array, info: Index, qd: Array,
+) -> None:  # fmt: skip
+    """Solve every regime with weight, for compiled code.
+
+    Args:
+        floats, integers, m, matrix, target, last, ends: A `Layout`.
+        A: (rows, n) Jacobians of all tasks, one below the other.
+        b: (rows,) their velocities.
+        weights: (tasks + 1,) of the regimes that keep 0, 1, ... tasks.
+        qd0: (n,) evasive velocity.
+        lower: (n,) lower limits.
+        upper: (n,) upper limits.
+        damping: (tasks + 1,) of each level, as in `solve_hierarchy`; the last one is 0.
+        x: (tasks + 1, n) zeros; becomes q̇ of each regime.
+        info: (tasks + 1, 3 + 2 n + rows) zeros; becomes what `own_hierarchy.run` says of each.
+        qd: (n,) zeros; becomes the blend.
+    """
+    n = qd0.shape[0]
+    for kept in range(weights.shape[0]):
+        if not weights[kept] > 0.0:
+            continue
+        # tasks 1..kept, and q̇ = q̇0, which closes every hierarchy
+        count = ends[kept - 1] if kept > 0 else np.int64(0)
+        rows = count + n
+        for i in range(rows):
+            target[i] = b[i] if i < count else qd0[i - count]
+            for j in range(n):
+                matrix[i, j] = A[i, j] if i < count else (1.0 if j == i - count else 0.0)
+        for level in range(kept):
+            last[level] = ends[level]
+        last[kept] = rows
+        known = view(target, 0, (rows,))
+        solve(
+            view(floats, 0, (_count_floats(n, rows, m),)), integers, m, x[kept],
+            view(info, kept * info.shape[1], (HEADER + n + rows,)), view(matrix, 0, (rows, n)), known, known,
+            view(target, 0, (0,)), view(last, 0, (kept + 1,)), lower, upper, False, view(damping, 0, (kept + 1,)),
+        )  # fmt: skip
+        for j in range(n):
+            qd[j] += weights[kept] * x[kept, j]
+
+
+class Layout(NamedTuple):
+    """Memory for tasks of certain numbers of rows; what it holds matters during a call only."""
+
+    floats: Array
+    integers: Index
+    m: int
+    matrix: Array
+    target: Array
+    last: Index
+    ends: Index
+
+
+_layouts: dict[tuple[int, ...], Layout] = {}
+
+
+def layout_for(n: int, counts: Sequence[int]) -> Layout:
+    """Memory for n joints and tasks of `counts` rows; kept, since a call needs it under the GIL only."""
+    known = _layouts.get((n, *counts))
+    if known is not None:
+        return known
+    if len(_layouts) >= 64:
+        _layouts.clear()
+    m, rows = max(n, *counts), sum(counts) + n
+    ends = np.cumsum(counts, dtype=np.int64)
+    layout = Layout(
+        *workspace(n, rows, m), m, np.empty((rows, n)), np.empty(rows), np.empty(len(counts) + 1, dtype=np.int64), ends
+    )
+    _layouts[(n, *counts)] = layout
+    return layout

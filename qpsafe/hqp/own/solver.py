@@ -1,0 +1,87 @@
+"""The own solver seen from Python: compiled once, then called with levels packed into arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from qpsafe.compiled import by_reference as reference
+from qpsafe.compiled.compiled import entry, linked
+from qpsafe.hqp.own import damping as own_damping, hierarchy as own_hierarchy, level as own_level, linear as own_linear, rules as own_rules, state as own_state
+from qpsafe.hqp.own.hierarchy import HEADER, run
+from qpsafe.hqp.own.state import workspace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def read(dimensions: int) -> Any:
+    """Type of an array to read, read-only or not, so that nothing is ever compiled a second time."""
+    return types.Array(types.float64, dimensions, "C", readonly=True)
+
+
+_SIGNATURE = types.void(
+    types.float64[::1], types.int64[::1], types.int64, types.float64[::1], types.int64[::1],
+    read(2), read(1), read(1), read(1), read(1).copy(dtype=types.int64), read(1), read(1),
+    types.boolean, read(1),
+)  # fmt: skip
+
+
+#: All the code that goes into the kernel.
+MODULES = (reference, own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
+solve = entry(_SIGNATURE, *MODULES)(run)
+solve_compiled = linked(solve, *MODULES)
+"""`solve` for compiled code."""
+_NO_WEIGHTS = np.empty(0)
+_memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}
+
+
+def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index]:
+    """Workspace for levels of `counts` rows; kept, because its contents matter during a call only (under the GIL)."""
+    if len(_memory) >= 64:
+        _memory.clear()
+    m = max(n, *counts) if counts else n
+    memory = (*workspace(n, sum(counts), m), m, np.cumsum(counts, dtype=np.int64))
+    _memory[(n, *counts)] = memory
+    return memory
+
+
+def solve_packed(
+    A: Array,
+    low: Array,
+    high: Array,
+    weight: Array | None,
+    counts: Sequence[int],
+    box_low: Array,
+    box_high: Array,
+    hard: bool,
+    damping: Array | None = None,
+) -> tuple[Array, Index]:
+    """Solve levels of `counts` rows each, packed one below the other.
+
+    Args:
+        A: (rows, n), C-contiguous.
+        low: (rows,) lower bounds.
+        high: (rows,) upper bounds.
+        weight: (rows,) weights or None.
+        counts: rows of each level.
+        box_low: (n,) lower limits.
+        box_high: (n,) upper limits.
+        hard: whether the first level are hard rows.
+        damping: (levels,) singular values below it are damped; None for none.
+
+    Returns:
+        q̇ (n,), and `info` of [`own_hierarchy.run`][qpsafe.hqp.own.hierarchy.run].
+    """
+    n = box_low.shape[0]
+    floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)
+    x = np.zeros(n)
+    info = np.zeros(HEADER + n + A.shape[0], np.int64)
+    weights = _NO_WEIGHTS if weight is None else weight
+    near = np.zeros(len(counts)) if damping is None else damping
+    solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, near)
+    return x, info

@@ -1,0 +1,167 @@
+"""What `SafetyController` is made of, checked at construction: a mistake is an error that names the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from qpsafe.danger.activation import Activation
+from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.compiled.compiled import Array, entry, readable
+from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.thresholds import robot_thresholds
+from qpsafe.errors import ConfigurationError
+from qpsafe.laws.problem import Law, LawResult
+from qpsafe.recovery.returns import RecoveryRules
+from qpsafe.sensing.spots import SpotArray
+from qpsafe.tasks.task import Task
+from qpsafe.text.words import counted
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+_FLOAT = np.dtype(np.float64)
+
+#: A law that moves a joint by more than this in one tick is broken [rad].
+ABSURD_STEP = 1e3
+#: A tick that is longer is meant in other units [s].
+LONGEST_TICK = 0.1
+
+
+def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
+    """The robot's thresholds (the IRB 140's are the source's): (18) for one task, (22) for two."""
+    if len(tasks) <= 2:
+        return Activation(robot_thresholds(robot)[: len(tasks)])
+    raise ConfigurationError(
+        "SafetyController", "activation", None, f"an Activation with {len(tasks)} thresholds for as many tasks"
+    )
+
+
+def checked_activation(tasks: tuple[Task, ...], activation: Activation | None, robot: Robot) -> Activation:
+    """The given activation, or the default one, if it has as many thresholds as there are tasks."""
+    activation = default_activation(tasks, robot) if activation is None else activation
+    if not isinstance(activation, Activation):
+        raise ConfigurationError("SafetyController", "activation", activation, "an Activation")
+    if len(activation.thresholds) != len(tasks):
+        found = f"{len(activation.thresholds)} thresholds"
+        raise ConfigurationError("SafetyController", "activation", found, f"{len(tasks)}")
+    return activation
+
+
+def checked_dt(where: str, dt: float) -> float:
+    """A tick as a float."""
+    number = isinstance(dt, Real) and not isinstance(dt, bool | np.bool_)
+    if not (number and 0.0 < float(dt) <= LONGEST_TICK):  # false for NaN
+        raise ConfigurationError(where, "dt", dt, f"a time in seconds, above 0, up to {LONGEST_TICK}; 4 ms is 0.004")
+    return float(dt)
+
+
+def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
+    """Refuse tasks that the robot cannot do."""
+    if not (isinstance(tasks, Sequence) and len(tasks) > 0):
+        raise ConfigurationError("SafetyController", "tasks", tasks, "a list of at least one task")
+    for k, task in enumerate(tasks):
+        if not isinstance(task, Task):
+            raise ConfigurationError("SafetyController", f"tasks[{k}]", task, "a Task, e.g. PositionTask")
+        misfit = task.misfit(robot)
+        if misfit is not None:
+            raise ConfigurationError("SafetyController", f"tasks[{k}].{misfit.key}", misfit.value, misfit.expected)
+        if not task.gain * dt < 1.0:
+            expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
+            raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)
+
+
+def checked_robot(where: str, robot: Robot) -> Robot:
+    """`robot`, if it is one."""
+    if not hasattr(robot, "wire_frames"):
+        raise ConfigurationError(where, "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
+    return robot
+
+
+def checked_law(law: Law) -> Law:
+    """`law`, if it can be asked."""
+    if isinstance(law, type) or not callable(getattr(law, "solve", None)):
+        raise ConfigurationError("SafetyController", "law", law, "a law with solve(problem), e.g. HierarchicalLaw()")
+    return law
+
+
+def checked_field(field: Any) -> Any:
+    """`field`, if it can be asked."""
+    if isinstance(field, type) or not callable(getattr(field, "evaluate", None)):
+        raise ConfigurationError("SafetyController", "field", field, "a DangerField")
+    return field
+
+
+def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:
+    """`evasion`, if it is one of this robot and this tick."""
+    if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
+        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {counted(robot.nq, 'joint')}")
+    if evasion.dt != dt:
+        raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
+    return evasion
+
+
+def checked_barrier(barrier: DangerBarrier | None, field: Any) -> DangerBarrier | None:
+    """`barrier`, if it caps the controller's own field."""
+    if barrier is None:
+        return None
+    if not isinstance(barrier, DangerBarrier):
+        raise ConfigurationError("SafetyController", "barrier", barrier, "a DangerBarrier, e.g. DangerBarrier(10.5)")
+    if barrier.field is not field and barrier.field != field:
+        raise ConfigurationError(
+            "SafetyController", "barrier.field", barrier.field, f"the controller's own field, {field}"
+        )
+    return barrier
+
+
+def checked_recovery(rules: RecoveryRules) -> RecoveryRules:
+    """`rules`, if they are some."""
+    if not isinstance(rules, RecoveryRules):
+        raise ConfigurationError("SafetyController", "recovery", rules, "RecoveryRules")
+    return rules
+
+
+def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
+    """`spots`, if this robot can carry them."""
+    if not isinstance(spots, SpotArray):
+        raise ConfigurationError("SafetyController", "spots", spots, "a SpotArray, e.g. qpsafe.load_spots(robot)")
+    spots.check(robot)
+    return spots
+
+
+def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+    """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be."""
+    if not isinstance(result, LawResult):
+        raise TypeError(f"the law returned {type(result).__name__}, expected a LawResult")
+    qd = result.qd
+    if not (type(qd) is np.ndarray and qd.dtype is _FLOAT):
+        qd = np.asarray(qd)
+    if qd.shape != q.shape or qd.dtype.kind not in "fiu":
+        raise ValueError(f"the law returned a velocity of shape {qd.shape}, {qd.dtype}, expected {len(q)} real numbers")
+    qd = np.asarray(qd, dtype=float)
+    if not _all_below(qd, ABSURD_STEP / dt):  # without limits nothing else would stop it
+        raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
+    return qd
+
+
+def check_command(command: object, dt: float) -> None:
+    """Refuse what limits or a barrier of another making have made of the law's velocity, if no robot could be sent it.
+
+    Raises:
+        ValueError: It is not finite, or absurd.
+    """
+    if not (type(command) is np.ndarray and command.dtype is _FLOAT and _all_below(command, ABSURD_STEP / dt)):
+        raise ValueError(f"the limits or the barrier lead to a command that is not finite or absurd: {command}")
+
+
+@entry(types.boolean(readable(1), types.float64))
+def _all_below(qd: Array, largest: float) -> bool:
+    good = True
+    for i in range(qd.shape[0]):
+        good = good and abs(qd[i]) < largest  # false for NaN
+    return good

@@ -1,0 +1,170 @@
+"""What a controller is made of: which parts may be exchanged while it runs, and which are given for good.
+
+A part never changes, see `qpsafe.fixed`; another one may take its place, and counts from the next tick on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from qpsafe.pipeline.checks import check_tasks, checked_activation, checked_barrier, checked_evasion, checked_field, checked_law
+from qpsafe.danger.activation import Activation
+from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.danger.evasion import Evasion
+from qpsafe.laws.problem import Law
+from qpsafe.limits import JointLimits, checked_limits
+from qpsafe.recovery.recovery import Recovery, RecoveryRules
+from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.spots import SpotArray
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+    from qpsafe.tasks.task import Task
+
+
+class Parts:
+    """The parts of a `SafetyController`.
+
+    Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`; what does
+    not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
+    """
+
+    _robot: Robot
+    _dt: float
+    _tasks: tuple[Task, ...]
+    _law: Law
+    _field: Any
+    _activation: Activation
+    _evasion: Evasion
+    _limits: JointLimits | None
+    _braking: JointLimits
+    _spots: SpotArray | None
+    _rules: SensingRules
+    _sensing: DistanceSensing | None
+    _barrier: DangerBarrier | None
+    _recovery_rules: RecoveryRules
+    _recovery: Recovery
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def dt(self) -> float:
+        """Tick [s]."""
+        return self._dt
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """What the robot is asked to do, highest priority first; see `set_tasks`."""
+        return self._tasks
+
+    @property
+    def law(self) -> Law:
+        """How tasks and evasion are combined."""
+        return self._law
+
+    @law.setter
+    def law(self, law: Law) -> None:
+        self._law = checked_law(law)
+
+    @property
+    def field(self) -> Any:
+        """The danger field."""
+        return self._field
+
+    @field.setter
+    def field(self, field: Any) -> None:
+        field = checked_field(field)
+        checked_barrier(self._barrier, field)
+        self._field = field
+
+    @property
+    def activation(self) -> Activation:
+        """Thresholds of the tasks."""
+        return self._activation
+
+    @activation.setter
+    def activation(self, activation: Activation) -> None:
+        activation = checked_activation(self._tasks, activation, self._robot)
+        self._recovery.suspend_above = activation.suspend_above
+        self._activation = activation
+
+    @property
+    def evasion(self) -> Evasion:
+        """The admittance (16); its velocity is remembered in it."""
+        return self._evasion
+
+    @evasion.setter
+    def evasion(self, evasion: Evasion) -> None:
+        self._evasion = checked_evasion(evasion, self._robot, self._dt)
+
+    @property
+    def limits(self) -> JointLimits | Literal["off"]:
+        """Joint limits; braking, without data or after a fault, keeps to them too."""
+        return "off" if self._limits is None else self._limits
+
+    @limits.setter
+    def limits(self, limits: JointLimits | str | None) -> None:
+        limits = checked_limits("SafetyController", limits, self._robot, self._dt)
+        # braking must not depend on code of the user's: plain limits of the same numbers
+        braking = JointLimits.of(self._robot, self._dt) if limits is None else limits.plain()
+        self._limits, self._braking = limits, braking
+
+    @property
+    def spots(self) -> SpotArray | None:
+        """The distance sensors."""
+        return self._spots
+
+    @property
+    def rules(self) -> SensingRules:
+        """What counts as danger, and what sick sensors do."""
+        return self._rules
+
+    @property
+    def sensing(self) -> DistanceSensing | None:
+        """The sensors with what they remember."""
+        return self._sensing
+
+    @property
+    def barrier(self) -> DangerBarrier | None:
+        """A cap on the danger field."""
+        return self._barrier
+
+    @barrier.setter
+    def barrier(self, barrier: DangerBarrier | None) -> None:
+        self._barrier = checked_barrier(barrier, self._field)
+
+    @property
+    def recovery_rules(self) -> RecoveryRules:
+        """How the robot returns to its path after danger."""
+        return self._recovery_rules
+
+    @property
+    def recovery(self) -> Recovery:
+        """Where it is on that way."""
+        return self._recovery
+
+    def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
+        """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
+
+        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
+
+        Args:
+            tasks: What it is asked to do now, highest priority first.
+            activation: Their thresholds; by default the present ones if the number of tasks stays.
+            restart: Whether the trajectories' clock, and their events, start from zero; else it goes on.
+
+        Raises:
+            ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
+        """
+        check_tasks(self._robot, tasks, self._dt)
+        if activation is None and len(tasks) == len(self._tasks):
+            activation = self._activation
+        activation = checked_activation(tuple(tasks), activation, self._robot)
+        self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
+        self._tasks, self._activation = tuple(tasks), activation

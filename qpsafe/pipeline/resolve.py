@@ -1,0 +1,242 @@
+"""The second half of a tick: from references and q̇0 to the command.
+
+    tasks --CLIK--> J, ẋ;   limits --> box;   J, ẋ, q̇0, activations, box --law--> q̇;   q̇ --box--> command
+
+One compiled call, see `qpsafe.pipeline.resolve_kernel`. A task, limits or a law of another making takes the place of its stage;
+the others stay the compiled ones.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import accumulate, pairwise
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.pipeline.checks import check_command, checked_velocity
+from qpsafe.hqp.own.regimes import layout_for
+from qpsafe.hqp.solution import SOLVED
+from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
+from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
+from qpsafe.limits import Box, JointLimits
+from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
+from qpsafe.tasks.task import PoseTask
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from qpsafe.hqp.level import Level
+    from qpsafe.laws.problem import Law
+    from qpsafe.robot.robot import Robot
+    from qpsafe.robot.state import RobotState
+    from qpsafe.tasks.clik import Clik
+    from qpsafe.tasks.task import Task
+
+Array = NDArray[np.float64]
+_FLOAT = np.dtype(np.float64)
+
+
+class Resolved:
+    """What is to be done in a tick; explained, from numbers that stay, when it is looked at.
+
+    Args:
+        command: Joint velocity (n,) [rad/s], inside the box.
+        excess: By how much the law's answer was outside; NaN if a limit gave way.
+        solved: Whether the law answered as planned.
+        box: Admissible velocities, if they are known already.
+        result: The law's answer, likewise.
+        frozen: Else they are made from the results of `resolve_tick`, the evasive velocity, the regimes' weights, the
+            rows of each task, the time it took [s], and whether there are limits.
+    """
+
+    def __init__(
+        self, command: Array, excess: float, solved: bool, box: Box | None = None, result: LawResult | None = None,
+        frozen: tuple[Any, ...] | None = None,
+    ) -> None:  # fmt: skip
+        self.command, self.excess, self.solved = command, excess, solved
+        self._box, self._result, self._frozen = box, result, frozen
+
+    @cached_property
+    def _parts(self) -> Parts:
+        assert self._frozen is not None
+        floats, integers, _, weights, counts, _, _ = self._frozen
+        return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
+
+    @cached_property
+    def box(self) -> Box | None:
+        """Admissible velocities; None without limits."""
+        if self._frozen is None or not self._frozen[-1]:
+            return self._box
+        return Box(*self._parts.bounds, *self._parts.codes)
+
+    @cached_property
+    def result(self) -> LawResult | None:
+        """The law's answer; None if it was not asked."""
+        if self._result is not None or self._frozen is None:
+            return self._result
+        cut, (_, _, qd0, weights, counts, taken, _) = self._parts, self._frozen
+        data = (cut.A, cut.b, qd0, *cut.bounds)
+        return BlendResult(cut.blend, cut.x, cut.info, weights, data, counts, taken, self.solved)
+
+    @cached_property
+    def errors(self) -> tuple[Array, ...]:
+        """Of the tasks against their references of this tick, (rows,) each."""
+        if self._frozen is None:
+            return ()
+        return tuple([self._parts.e[first:last] for first, last in pairwise([0, *accumulate(self._frozen[4])])])
+
+
+class Resolve:
+    """Resolves ticks with one set of tasks and one law; whoever exchanges them makes another `Resolve`.
+
+    Args:
+        robot: The robot.
+        tasks: Highest priority first.
+        law: The law.
+        dt: Tick [s].
+    """
+
+    def __init__(self, robot: Robot, tasks: Sequence[Task], law: Law, dt: float) -> None:
+        self.parts = tasks, law
+        self._robot, self._dt = robot, dt
+        #: Rows of each task that the compiled call fills in, None for the others.
+        self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
+        own = type(law) is HierarchicalLaw and law.solver in (None, "own")
+        self._ours = own and (law.projection == "strict" or len(tasks) == 1)  # type: ignore[attr-defined]
+        self._block = np.zeros(26 * len(tasks) + 2 + robot.nq)
+        cut = given(self._block, robot.nq, len(tasks))
+        self._gains, self._standing, self._goals, self._twists, self._weights, _, self._qd0 = cut
+        self._gains[:] = [task.gain for task in tasks]
+        nowhere = (0, np.eye(4))
+        mountings = [
+            robot.mounting(task.frame) if isinstance(task, PoseTask) and rows is not None else nowhere
+            for task, rows in zip(tasks, self._rows, strict=True)
+        ]
+        self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
+        self._layouts: dict[tuple[int, ...], tuple[Any, ...]] = {}
+
+    def __call__(
+        self, state: RobotState, qd: Array, qdd: Array, samples: Sequence[Any], qd0: Array,
+        activations: tuple[float, ...], limits: JointLimits | None, soft: tuple[Level, ...] = (),
+    ) -> Resolved:  # fmt: skip
+        """Resolve one tick.
+
+        Args:
+            state: Commanded configuration.
+            qd: Commanded velocity (n,) [rad/s].
+            qdd: Acceleration that led to it (n,) [rad/s²].
+            samples: Reference of every task.
+            qd0: Evasive velocity (n,) [rad/s].
+            activations: Of the tasks.
+            limits: Joint limits, or None.
+            soft: Levels under the limits.
+
+        Raises:
+            ValueError, TypeError: What a part returned could not be sent to a robot.
+        """  # fmt: skip
+        begin = perf_counter()
+        counts, asked = self._take(state, samples)
+        made = self._layouts.get(counts)
+        if made is None:
+            made = self._layouts[counts] = self._laid_out(counts)
+        rows, layout, sizes = made
+        command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
+        plain = type(limits) is JointLimits and limits.max_jerk is None
+        if asked or not plain:
+            box = None if plain or limits is None else limits.box(state.q, qd, qdd)
+            self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
+        table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
+        ours = self._ours and limits is not None and not soft
+        self._weights[:] = weights = weights_of(activations)
+        self._qd0[:] = qd0
+        law = self.parts[1]
+        damping = (law.damping, law.damping_time) if ours else (np.nan, np.nan)  # type: ignore[attr-defined]
+        excess, worst = resolve_tick(
+            state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
+            table, self._dt, return_speed, *damping, *layout, floats, integers, command,
+        )  # fmt: skip
+        if excess < 0.0:
+            raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
+        frozen = (floats, integers, qd0, weights, counts, perf_counter() - begin, limits is not None)
+        if ours:
+            if not plain:  # whatever limits of another making do to it
+                check_command(command, self._dt)
+            return Resolved(command, excess, worst == 0.0, frozen=frozen)
+        return self._by_law(Resolved(command, 0.0, False, frozen=frozen), state, activations, soft)
+
+    def _take(self, state: RobotState, samples: Sequence[Any]) -> tuple[tuple[int, ...], dict[int, Clik]]:
+        """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
+        asked: dict[int, Clik] = {}
+        counts = []
+        for k, (task, rows, sample) in enumerate(zip(self.parts[0], self._rows, samples, strict=True)):
+            if rows is not None:
+                pose, twist = sample.pose, sample.twist
+                if (
+                    type(pose) is type(twist) is np.ndarray
+                    and pose.dtype is twist.dtype is _FLOAT
+                    and pose.shape == (4, 4)
+                    and twist.shape == (6,)
+                ):
+                    self._goals[k], self._twists[k], self._standing[k] = pose, twist, 0.0
+                    counts.append(len(rows))
+                    continue
+            self._standing[k] = 1.0
+            asked[k] = task.clik(state, sample)
+            counts.append(len(asked[k].velocity))
+        return tuple(counts), asked
+
+    def _laid_out(self, counts: tuple[int, ...]) -> tuple[Any, ...]:
+        """For tasks of these numbers of rows: which rows of a pose each is, memory of the solver, sizes of results."""
+        kinds = [rows if rows is not None else (0,) * count for rows, count in zip(self._rows, counts, strict=True)]
+        rows = np.array([row for kind in kinds for row in kind], dtype=np.int64)
+        n = self._robot.nq
+        return rows, layout_for(n, counts), sizes_of(n, len(rows), len(counts) + 1)
+
+    @staticmethod
+    def _fill(cut: Parts, asked: dict[int, Clik], counts: tuple[int, ...], box: Box | None) -> None:
+        """Write down what parts of another making answered."""
+        ends = [0, *accumulate(counts)]
+        for k, clik in asked.items():
+            rows = slice(ends[k], ends[k + 1])
+            if np.shape(clik.jacobian) != cut.A[rows].shape or np.shape(clik.error) != (counts[k],):
+                shapes = f"{np.shape(clik.jacobian)}, {np.shape(clik.velocity)}, {np.shape(clik.error)}"
+                raise ValueError(f"task {k + 1} gave Jacobian, velocity and error of shapes {shapes}")
+            cut.A[rows], cut.b[rows], cut.e[rows] = clik
+        if box is not None:
+            cut.bounds[0], cut.bounds[1] = box.lower, box.upper
+            cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
+
+    def _by_law(
+        self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]
+    ) -> Resolved:
+        """Ask a law of another making, or for what the compiled call does not know."""
+        cut, (_, _, qd0, _, counts, _, limited) = made._parts, made._frozen  # type: ignore[misc]
+        pairs = list(pairwise([0, *accumulate(counts)]))
+        wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
+        corrections = tuple([task.gain * cut.e[a:b] for task, (a, b) in zip(self.parts[0], pairs, strict=True)])
+        lower, upper = cut.bounds.copy() if limited else (None, None)
+        result = self.parts[1].solve(LawProblem(wishes, qd0.copy(), activations, lower, upper, soft, corrections))
+        answer = checked_velocity(result, state.q, self._dt)
+        command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
+        check_command(command, self._dt)
+        return Resolved(command, excess, result.status == SOLVED, result=result, frozen=made._frozen)
+
+
+_NO_LIMITS = np.empty((0, 0))
+
+
+def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
+    """What was unusual, in words: limits that gave way, a law that exceeded them, a solver that did not finish."""
+    box, result = resolved.box, resolved.result
+    assert result is not None
+    messages: tuple[str, ...] = ()
+    if box is not None and not resolved.excess <= 1e-9:
+        beyond = np.abs(box.clip(result.qd) - result.qd) > 1e-9
+        messages = box.notes(names)
+        if beyond.any():
+            clipped = ", ".join(name for name, much in zip(names, beyond, strict=True) if much)
+            messages = (*messages, "the law exceeded the limits, clipped: " + clipped)
+    return messages if resolved.solved else (*messages, f"law: {result.status}")

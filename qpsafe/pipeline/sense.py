@@ -1,0 +1,173 @@
+"""The first half of a tick: from what was measured to the danger and the velocity that evades it.
+
+    distances --(7), sensing rules--> points --(1)-(6)--> danger vectors --(8), (14), (15)--> torque --(16)--> q̇0
+
+One compiled call, see `qpsafe.pipeline.sense_kernel`. A field or an evasion of another making takes the place of its stage; the
+stages before it stay the compiled ones.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.field import DangerField
+from qpsafe.danger.push import push_vectors
+from qpsafe.robot.wire import Wire
+from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
+from qpsafe.sensing.detection import BadInput, as_floats, as_points, plausible, refuse, refuse_points
+from qpsafe.sensing.health import CLEAR
+from qpsafe.sensing.sensing import DistanceSensing
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Seen(NamedTuple):
+    """What a tick knows of the danger.
+
+    Attributes:
+        points: Points that count (p, 3), world frame [m].
+        links: Wire link of each (p,).
+        danger: CDF at them (p,).
+        vectors: Danger vectors (6) at them (p, 3).
+        cdf_n: The largest danger.
+        qd0: Evasive velocity q̇0 (n,) [rad/s].
+        notes: What is wrong with the sensors, in words.
+        capped: Whether the robot has to go slowly, since a sensor is dead.
+    """
+
+    points: Array
+    links: NDArray[np.int64]
+    danger: Array
+    vectors: Array
+    cdf_n: float
+    qd0: Array
+    notes: tuple[str, ...] = ()
+    capped: bool = False
+
+
+class Sense:
+    """Senses ticks with one set of parts; parts do not change, whoever exchanges one makes another `Sense`.
+
+    Args:
+        robot: The robot.
+        sensing: Its distance sensors, or None.
+        field: The danger field.
+        evasion: The admittance.
+    """
+
+    def __init__(self, robot: Robot, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> None:
+        self.parts = sensing, field, evasion
+        self._robot, self._shape = robot, (robot.nq,)
+        self._ours = type(field) is DangerField, type(evasion) is Evasion
+        tables = {} if sensing is None else sensing.tables._asdict()
+        starts, stops = robot.wire_indices
+        ours = all(self._ours)
+        given = (
+            tables | robot.tree._asdict() | {"plausible": np.array(plausible(robot)), "starts": starts, "stops": stops}
+        )
+        given["weights"] = (field.static, field.kinetic, field.gamma, field.floor) if ours else (nan,) * 4
+        given["A"], given["B"] = evasion.matrices if ours else np.zeros((2, robot.nq, robot.nq))
+        counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]
+        self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
+        self._blocks = pack(self._sizes, given, given)
+        self._work = np.empty(work_size(self._sizes, counts[0]))
+
+    def __call__(
+        self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None, ages: ArrayLike | None
+    ) -> Seen:
+        """Sense one tick; arguments as for `SafetyController.step`.
+
+        Raises:
+            BadInput: Wrong shapes, or values that are no measurement; too many spots out of order; a point, or its
+                danger, that is not finite; both or neither of distances and points: silence is not safety, "nothing in
+                sight" is said by distances of +inf or an empty list of points.
+        """
+        if distances is not None and points is not None:
+            raise BadInput("both distances and points are given, expected one of them")
+        q, qd = as_floats("q", q), as_floats("qd", qd)
+        if not q.shape == qd.shape == self._shape:
+            refuse(q, qd, self._robot)
+        if points is not None:
+            return self._by_points(q, qd, points)
+        if distances is None:
+            raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
+        distances = as_floats("distances", distances)
+        if distances.ndim == 2 and distances.shape[1] == 3:
+            return self._by_points(q, qd, distances)
+        return self._by_distances(q, qd, distances, ages)
+
+    def _by_distances(self, q: Array, qd: Array, distances: Array, ages: ArrayLike | None) -> Seen:
+        sensing, _, evasion = self.parts
+        if sensing is None:
+            raise BadInput("distances are given but the robot has no spots")
+        k = len(sensing.fresh)
+        if distances.shape != (k,):
+            raise BadInput(f"distances have shape {distances.shape}, expected {(k,)}")
+        points, links, danger, vectors = np.empty((k, 3)), np.empty(k, np.int64), np.empty(k), np.empty((k, 3))
+        qd0 = np.empty(len(q))
+        count, dead, out, cdf_n = sense_readings(
+            q, qd, distances, sensing.as_ages(ages), *self._blocks, *sensing.memory, evasion.velocity, self._work,
+            points, links, danger, vectors, qd0,
+        )  # fmt: skip
+        if count < 0:
+            refuse(q, qd, self._robot)
+        severity, too_many, notes = sensing.take(dead, out)
+        if too_many:
+            raise BadInput("; ".join(notes))
+        seen = Seen(
+            points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, severity != CLEAR
+        )
+        return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
+
+    def _by_points(self, q: Array, qd: Array, value: ArrayLike) -> Seen:
+        given = as_points(value)
+        p = len(given)
+        points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
+        qd0, work, before = np.empty(len(q)), np.empty(work_size(self._sizes, p)), self.parts[2].velocity
+        count, cdf_n = sense_points(q, qd, given, *self._blocks, before, work, points, links, danger, vectors, qd0)
+        if count == -1:
+            refuse(q, qd, self._robot)
+        if count < 0:
+            refuse_points(points)
+        return self._ended(Seen(points, links, danger, vectors, cdf_n, qd0), work, 0)
+
+    def _ended(self, seen: Seen, work: Array, moving: int) -> Seen:
+        """What is left to do: the stages of another making, and to remember q̇0."""
+        _, field, evasion = self.parts
+        if not all(self._ours):
+            seen = self._asked(seen, field, evasion, work, moving)
+        elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
+            raise BadInput(_NOT_FINITE)
+        else:
+            evasion.velocity = seen.qd0.copy()
+        return seen
+
+    def _asked(self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int) -> Seen:
+        """Danger and q̇0 by a field and an evasion that are asked method by method."""
+        n, m, memory = len(seen.qd0), len(self._robot.wire_frames), self._robot.memory
+        a = memory + 12 * m
+        wire = Wire(*work[memory:a].reshape(4, m, 3).copy())
+        velocities = work[a + n : a + n + 3 * moving].reshape(moving, 3).copy() if moving else None
+        values, gradient = field.evaluate(seen.points, wire, velocities)  # (1)-(5)
+        torque, danger, vectors = np.empty(n), np.array(values, dtype=float), np.array(gradient, dtype=float)
+        if not (danger.shape == (len(seen.points),) and vectors.shape == seen.points.shape):
+            raise ValueError(f"the field gave values and gradients of shapes {danger.shape} and {vectors.shape}")
+        cdf_n = push_vectors(  # (6), (8), (14), (15)
+            danger, seen.links, work[:memory], self._robot.ends, *self._robot.wire_indices,
+            vectors, torque,
+        )  # fmt: skip
+        if not isfinite(cdf_n):
+            raise BadInput(_NOT_FINITE)
+        qd0 = np.array(evasion.step(torque), dtype=float)  # (16)
+        return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)
+
+
+_NOT_FINITE = "the danger of a detected point is not finite: joint values or points are out of all bounds"

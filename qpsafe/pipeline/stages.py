@@ -1,0 +1,71 @@
+"""The two halves of a tick with the present parts of a controller, made again when somebody exchanged one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from qpsafe.pipeline.checks import check_command
+from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.pipeline.resolve import Array, Resolve, Resolved
+from qpsafe.pipeline.sense import Seen, Sense
+
+if TYPE_CHECKING:
+    from qpsafe.danger.evasion import Evasion
+    from qpsafe.laws.problem import Law
+    from qpsafe.robot.robot import Robot
+    from qpsafe.sensing.sensing import DistanceSensing
+    from qpsafe.tasks.task import Task
+
+
+class Stages:
+    """Makes and keeps them.
+
+    Args:
+        robot: The robot.
+        dt: Tick [s].
+    """
+
+    def __init__(self, robot: Robot, dt: float) -> None:
+        self._robot, self._dt = robot, dt
+        self._sense: Sense | None = None
+        self._resolve: Resolve | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy makes its own: what is kept here cuts its memory into views, which copying would tear apart."""
+        return Stages, (self._robot, self._dt)
+
+    def sense(self, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> Sense:
+        """From measurements to q̇0."""
+        made = self._sense
+        if made is None or not (made.parts[0] is sensing and made.parts[1] is field and made.parts[2] is evasion):
+            made = self._sense = Sense(self._robot, sensing, field, evasion)
+        return made
+
+    def resolve(self, tasks: Sequence[Task], law: Law) -> Resolve:
+        """From references and q̇0 to the command."""
+        made = self._resolve
+        if made is None or not (made.parts[0] is tasks and made.parts[1] is law):
+            made = self._resolve = Resolve(self._robot, tasks, law, self._dt)
+        return made
+
+    def resolve_under(
+        self, barrier: DangerBarrier, measured: Array, seen: Seen, resolve: Resolve, given: tuple[Any, ...]
+    ) -> Resolved:
+        """The same under a cap on the danger field: a soft level first, then scaled exactly.
+
+        Args:
+            barrier: The cap.
+            measured: Joint position (n,) [rad].
+            seen: Detected points and their danger.
+            resolve: The half of the tick.
+            given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits, as `resolve` takes them.
+        """
+        state, qd = self._robot.at(measured), given[1]
+        level = barrier.level(state, qd, seen.points, seen.danger)
+        resolved = resolve(*given, (level,) if level else ())
+        # exact, as far as the acceleration limits allow
+        command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
+        resolved.command = command if resolved.box is None else resolved.box.clip(command)
+        check_command(resolved.command, self._dt)
+        return resolved

@@ -1,0 +1,1 @@
+"""Suspension and return to the path."""

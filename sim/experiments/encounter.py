@@ -1,0 +1,82 @@
+"""How near robot and people came in a run: contact or not, and how fast the robot was then."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from qpsafe.sim.recording.log import RunLog
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+MOVING = 1e-3  # below this the robot counts as standing [m/s]
+
+
+@dataclass(frozen=True)
+class Encounter:
+    """The nearest that robot and people, boards included, came to each other.
+
+    Attributes:
+        distance: Smallest true distance, negative where they overlap [m].
+        time: When [s].
+        contact: When they first touched [s]; None if never.
+        robot_speed: Of the robot's fastest point at that moment, at the smallest distance if they never touched [m/s].
+        closing_speed: How fast the distance shrank at that moment [m/s].
+        fastest_in_contact: Of the robot's fastest point while they touched [m/s]; None if never.
+        moving_contact: How long they touched while the robot moved faster than 1 mm/s [s].
+        danger: Largest CDF_n.
+    """
+
+    distance: float
+    time: float
+    contact: float | None
+    robot_speed: float
+    closing_speed: float
+    fastest_in_contact: float | None
+    moving_contact: float
+    danger: float
+
+    def sentence(self) -> str:
+        """The encounter in words."""
+        if self.contact is None:
+            return (
+                f"no contact; nearest {1e3 * self.distance:.0f} mm at {self.time:.2f} s, "
+                f"robot at {self.robot_speed:.3f} m/s then"
+            )
+        return (
+            f"CONTACT at {self.contact:.2f} s, robot at {self.robot_speed:.3f} m/s, closing at "
+            f"{self.closing_speed:.2f} m/s; {self.moving_contact:.2f} s of contact with the robot moving, "
+            f"up to {self.fastest_in_contact or 0.0:.3f} m/s"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def encounter(log: RunLog, robot: Robot) -> Encounter:
+    """Measure a run; people and boards are not pushed away by the robot, nor it by them."""
+    gap = np.minimum(log.person_distance, log.board_distance)
+    nearest = int(gap.argmin())
+    touching = np.flatnonzero(gap <= 0.0)
+    speeds = [fastest_point(robot, log.q[k], log.qd[k]) for k in touching]
+    first = int(touching[0]) if len(touching) else nearest
+    return Encounter(
+        distance=float(gap[nearest]),
+        time=float(log.time[nearest]),
+        contact=float(log.time[first]) if len(touching) else None,
+        robot_speed=fastest_point(robot, log.q[first], log.qd[first]),
+        closing_speed=float(gap[max(first - 1, 0)] - gap[first]) / log.dt,
+        fastest_in_contact=max(speeds) if speeds else None,
+        moving_contact=log.dt * sum(speed > MOVING for speed in speeds),
+        danger=float(np.nanmax(log.cdf_n)),
+    )
+
+
+def fastest_point(robot: Robot, q: np.ndarray, qd: np.ndarray) -> float:
+    """Speed of the fastest end of the robot's wire model [m/s]."""
+    wire = robot.wire(q, qd)
+    return float(np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1).max())

@@ -1,0 +1,1 @@
+"""The first experiment: a fixed tool."""

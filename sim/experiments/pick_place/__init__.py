@@ -1,0 +1,1 @@
+"""The third experiment: pick and place."""

@@ -1,0 +1,1 @@
+"""A simulated IRC5 at the other end of the wire."""

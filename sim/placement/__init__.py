@@ -1,0 +1,1 @@
+"""Monte Carlo of robots and people, to place sensors."""

@@ -1,0 +1,1 @@
+"""Runs of the controller on recorded data."""

@@ -1,0 +1,1 @@
+"""Sick sensors in closed loop."""

@@ -1,0 +1,1 @@
+"""Stories: who walks, reaches and carries when."""

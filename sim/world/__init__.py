@@ -1,0 +1,1 @@
+"""The world in MuJoCo: scene, plant, sensors, true distances."""

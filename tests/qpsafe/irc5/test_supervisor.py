@@ -1,0 +1,203 @@
+"""The supervisor only escalates until acknowledged, and says why; its diagram in the docs is its table."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from qpsafe.irc5.supervisor import MOST_CAUSES, TRANSITIONS, Event, State, StopCategory, Supervisor
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "supervisor.md"
+CAUSES = st.sampled_from(["sensor 3", "robot: motors off", "watchdog", "no packet", "operator"])
+CATEGORIES = st.sampled_from(StopCategory)
+
+
+class Stream(RuleBasedStateMachine):
+    """Any sequence of events."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 0.0
+        self.heard: list = []
+        self.supervisor = Supervisor(lambda: self.now, on_transition=self.heard.append)
+        self.worst = self.supervisor.state
+        self.gravest: StopCategory | None = None
+
+    @rule(cause=CAUSES)
+    def seed(self, cause: str) -> None:
+        self.check(Event.SEED, self.supervisor.seed(cause), cause)
+
+    @rule(cause=CAUSES)
+    def run(self, cause: str) -> None:
+        self.check(Event.RUN, self.supervisor.run(cause), cause)
+
+    @rule(cause=CAUSES)
+    def degrade(self, cause: str) -> None:
+        self.check(Event.DEGRADE, self.supervisor.degrade(cause), cause)
+
+    @rule(category=CATEGORIES, cause=CAUSES)
+    def stop(self, category: StopCategory, cause: str) -> None:
+        asked = self.supervisor.stop(category, cause)
+        self.check(Event.CUT if category == 0 else Event.STOP, asked, cause)
+        # whatever the state was: from now on the robot stops, at least as gravely as asked, and the cause is kept
+        assert self.supervisor.state in (State.STOPPING, State.STOPPED)
+        assert self.supervisor.category is not None
+        assert self.supervisor.category <= category
+        assert cause in self.supervisor.causes
+
+    @rule(cause=CAUSES)
+    def standstill(self, cause: str) -> None:
+        self.check(Event.STANDSTILL, self.supervisor.standstill(cause), cause)
+
+    @rule(cause=CAUSES)
+    def acknowledge(self, cause: str) -> None:
+        before = self.supervisor.state
+        done = self.supervisor.acknowledge(cause)
+        assert done == (before in (State.DEGRADED, State.STOPPED))
+        if done:  # never to more than what it was before the trouble
+            assert self.supervisor.state == {State.DEGRADED: State.RUNNING, State.STOPPED: State.IDLE}[before]
+            assert self.supervisor.causes == ()
+            assert self.supervisor.category is None
+            self.worst, self.gravest = self.supervisor.state, None
+        else:
+            assert self.supervisor.state is before
+
+    @rule(step=st.floats(0.0, 10.0))
+    def wait(self, step: float) -> None:
+        self.now += step
+
+    def check(self, event: Event, changed: bool, cause: str) -> None:
+        """A reported change is on the log with its cause, time and event; without one nothing changed."""
+        if changed:
+            last = self.supervisor.log[-1]
+            assert (last.after, last.event, last.cause) == (self.supervisor.state, event, cause)
+            assert last.time == self.now
+
+    @invariant()
+    def only_escalates(self) -> None:
+        state, category = self.supervisor.state, self.supervisor.category
+        assert state.severity >= self.worst.severity
+        assert self.gravest is None or (category is not None and category <= self.gravest)
+        self.worst, self.gravest = state, category
+
+    @invariant()
+    def what_is_wrong_has_a_cause(self) -> None:
+        bad = self.supervisor.state.severity >= State.DEGRADED.severity
+        assert bool(self.supervisor.causes) == bad
+        assert (self.supervisor.category is not None) == (self.supervisor.state in (State.STOPPING, State.STOPPED))
+
+    @invariant()
+    def the_log_is_a_chain(self) -> None:
+        log = list(self.supervisor.log)
+        assert log == self.heard
+        assert self.supervisor.count == len(log)
+        state = State.IDLE
+        for transition in log:
+            assert transition.before is state
+            assert transition.cause
+            assert transition.after is TRANSITIONS.get((state, transition.event), state)
+            state = transition.after
+        assert state is self.supervisor.state
+
+    @precondition(lambda self: self.supervisor.silent)
+    @invariant()
+    def silence_is_not_broken_but_by_acknowledgement(self) -> None:
+        for again in (self.supervisor.seed, self.supervisor.run):
+            assert not again("by itself")
+        assert self.supervisor.silent
+        assert not self.supervisor.moving
+
+
+TestStream = Stream.TestCase
+TestStream.settings = settings(max_examples=120, stateful_step_count=30, deadline=None)
+
+
+def test_no_event_but_acknowledgement_leads_back() -> None:
+    for (before, event), after in TRANSITIONS.items():
+        if event is not Event.ACKNOWLEDGE:
+            assert after.severity > before.severity
+    assert [state.value for state in State] == ["idle", "seeding", "running", "degraded", "stopping", "stopped"]
+
+
+def test_every_state_can_be_stopped_and_every_category_has_a_name() -> None:
+    for state in (State.IDLE, State.SEEDING, State.RUNNING, State.DEGRADED):
+        assert {(state, Event.STOP), (state, Event.CUT)} <= set(TRANSITIONS)
+    assert {c.value: c.name for c in StopCategory} == {
+        0: "IMMEDIATE",
+        1: "CONTROLLED_THEN_SILENT",
+        2: "CONTROLLED_AND_HELD",
+    }
+
+
+def test_the_log_is_bounded_and_a_repeated_cause_is_logged_once() -> None:
+    supervisor = Supervisor(keep=5)
+    supervisor.seed("ready")
+    supervisor.run("ramped in")
+    for _ in range(1000):
+        supervisor.degrade("sensor 3 is sick")
+    assert supervisor.count == 3
+    for k in range(1000):
+        supervisor.degrade(f"cause {k}")
+    assert len(supervisor.log) == 5
+    assert len(supervisor.causes) <= 100
+    text = str(supervisor.log[-1])
+    assert "degraded -> degraded" in text
+    assert "cause" in text
+
+
+@given(
+    st.lists(st.floats(0.0, 1e6, allow_subnormal=False), min_size=2, max_size=60),
+    st.sampled_from(["joint_2 is {} rad from what it was sent", "law: <object at 0x{:x}> failed after {:.3f} s"]),
+)
+@settings(max_examples=50, deadline=None)
+def test_a_cause_whose_figures_change_is_one_cause_and_one_line(figures: list[float], words: str) -> None:
+    supervisor = Supervisor()
+    supervisor.seed("ready")
+    for figure in figures:
+        text = words.format(repr(float(figure))) if "joint" in words else words.format(int(figure), figure)
+        supervisor.stop(StopCategory.CONTROLLED_AND_HELD, text)
+    assert len(supervisor.causes) == 1
+    assert supervisor.count == 2
+
+
+def test_names_with_numbers_are_causes_of_their_own_up_to_a_bound() -> None:
+    supervisor = Supervisor()
+    supervisor.seed("ready")
+    for k in range(5):
+        supervisor.degrade(f"spot {k} is dead, joint_{k} too")
+    assert len(supervisor.causes) == 5
+    for k in range(5000):
+        supervisor.degrade(f"spot {k} is dead")
+    assert len(supervisor.causes) == MOST_CAUSES + 1
+    assert "further causes" in supervisor.causes[-1]
+    assert supervisor.stop(StopCategory.IMMEDIATE, "and what stops it is listed all the same")
+    assert "listed all the same" in supervisor.causes[-1]
+
+
+def test_whatever_listening_raises_the_supervisor_goes_on() -> None:
+    def fail(transition: object) -> None:
+        raise OSError("no space left")
+
+    supervisor = Supervisor(on_transition=fail)
+    assert supervisor.seed("ready")
+    assert supervisor.stop(StopCategory.CONTROLLED_THEN_SILENT, "Ctrl-C")
+    assert supervisor.state is State.STOPPING
+    assert supervisor.unheard == "OSError"
+
+
+def test_a_wrong_category_is_refused() -> None:
+    with pytest.raises(ValueError, match="3"):
+        Supervisor().stop(3, "no such category")  # type: ignore[arg-type]
+
+
+def test_the_diagram_is_the_table() -> None:
+    """States and edges of the page's mermaid diagram are those of the code."""
+    (block,) = re.findall(r"^```mermaid\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    drawn = re.findall(r"^\s*(\w+) --> (\w+): (.+)$", block, re.MULTILINE)
+    edges = [(a, word.strip(), b) for a, b, words in drawn for word in words.split(",")]
+    assert len(edges) == len(set(edges))
+    assert set(edges) == {(a.value, event.value, b.value) for (a, event), b in TRANSITIONS.items()}
+    assert f"[*] --> {Supervisor().state}" in block
