@@ -10,8 +10,8 @@ import numpy as np
 
 from qpsafe.cli.outputs import try_file
 from qpsafe.danger.field import DangerField
-from qpsafe.text.json_text import json_text
 from qpsafe.robot.wire import Wire
+from qpsafe.text.json_text import json_text
 
 POINTS, LINKS, GOAL_US = 20, 6, 40.0
 

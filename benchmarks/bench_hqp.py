@@ -22,9 +22,9 @@ from hqp_family import KINDS, Hierarchy, drift, family
 
 from qpsafe.cli.outputs import try_file
 from qpsafe.hqp.backends.cascade import solve_cascade
-from qpsafe.hqp.level import Level
 from qpsafe.hqp.backends.native_daqp import arrange, call_daqp
 from qpsafe.hqp.backends.native_proxqp import solve_proxqp
+from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.text.json_text import json_text
 

@@ -18,10 +18,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from qpsafe.cli.outputs import try_file
-from qpsafe.text.json_text import json_text
-from qpsafe.sim.irc5.compare import stream_process
 from qpsafe.bench.clock import machine
+from qpsafe.cli.outputs import try_file
+from qpsafe.sim.irc5.compare import stream_process
+from qpsafe.text.json_text import json_text
 from qpsafe.text.words import growth
 
 MAIN = "from qpsafe.cli.main import main; main()"

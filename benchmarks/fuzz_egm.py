@@ -24,8 +24,8 @@ from qpsafe.cli.outputs import try_file
 from qpsafe.irc5.inbox import REFUSALS
 from qpsafe.irc5.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
 from qpsafe.irc5.session import EgmSession
-from qpsafe.text.json_text import json_text
 from qpsafe.limits import JointLimits
+from qpsafe.text.json_text import json_text
 
 N, DT = 6, 0.004
 LIMITS = JointLimits(np.full(N, -3.0), np.full(N, 3.0), np.full(N, 3.0), np.full(N, 10.0), DT)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 import qpsafe
+from qpsafe.sim.drawing.stories import plan_figure
 from qpsafe.sim.experiments.fast_person import at_speed, fast_figure, runs
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.world.scene import build_scene
 from qpsafe.sim.stories.file import load_story
-from qpsafe.sim.drawing.stories import plan_figure
+from qpsafe.sim.world.scene import build_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 IMG = ROOT / "docs" / "img"

@@ -61,7 +61,6 @@ if TYPE_CHECKING:
     from qpsafe.controller import SafetyController as SafetyController
     from qpsafe.danger.activation import Activation as Activation
     from qpsafe.danger.activation import Threshold as Threshold
-    from qpsafe.laws.barrier import DangerBarrier as DangerBarrier
     from qpsafe.danger.evasion import Evasion as Evasion
     from qpsafe.danger.field import DangerField as DangerField
     from qpsafe.danger.thresholds import robot_activation as robot_activation
@@ -71,6 +70,9 @@ if TYPE_CHECKING:
     from qpsafe.errors import RobotWarning as RobotWarning
     from qpsafe.hqp.level import Level as Level
     from qpsafe.hqp.solve import solve_hierarchy as solve_hierarchy
+    from qpsafe.irc5.supervisor import StopCategory as StopCategory
+    from qpsafe.irc5.supervisor import Supervisor as Supervisor
+    from qpsafe.laws.barrier import DangerBarrier as DangerBarrier
     from qpsafe.laws.hierarchical import HierarchicalLaw as HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw as NullspaceLaw
     from qpsafe.laws.nullspace import nullspace_velocity as nullspace_velocity
@@ -87,8 +89,6 @@ if TYPE_CHECKING:
     from qpsafe.sensing.rules import SensingRules as SensingRules
     from qpsafe.sensing.spots import SpotArray as SpotArray
     from qpsafe.sensing.spots import load_spots as load_spots
-    from qpsafe.irc5.supervisor import StopCategory as StopCategory
-    from qpsafe.irc5.supervisor import Supervisor as Supervisor
     from qpsafe.tasks.frame import FrameTask as FrameTask
     from qpsafe.tasks.frame import RelativeFrameTask as RelativeFrameTask
     from qpsafe.tasks.joint import JointTask as JointTask

@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.activation import Activation
+from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.field import DangerField
+from qpsafe.errors import in_words
+from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.problem import Law
+from qpsafe.limits import JointLimits
 from qpsafe.pipeline.braking import brake, slower
 from qpsafe.pipeline.checks import (
     check_tasks,
@@ -20,29 +28,21 @@ from qpsafe.pipeline.checks import (
     checked_robot,
     checked_spots,
 )
-from qpsafe.danger.activation import Activation
-from qpsafe.laws.barrier import DangerBarrier
-from qpsafe.danger.evasion import Evasion
-from qpsafe.danger.field import DangerField
-from qpsafe.errors import in_words
-from qpsafe.laws.hierarchical import HierarchicalLaw
-from qpsafe.laws.problem import Law
-from qpsafe.limits import JointLimits
 from qpsafe.pipeline.parts import Parts
-from qpsafe.recovery.recovery import RECOVERING, Recovery, RecoveryRules
-from qpsafe.reference import JointReference
 from qpsafe.pipeline.resolve import Resolved, judged
+from qpsafe.pipeline.stages import Stages
+from qpsafe.recovery.recovery import RECOVERING, Recovery, RecoveryRules
 from qpsafe.recovery.returns import GentleLimits
+from qpsafe.recovery.stall import CALM, StallWatch
+from qpsafe.reference import JointReference
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
+from qpsafe.sensing.speed_cap import slowed
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
-from qpsafe.sensing.speed_cap import slowed
-from qpsafe.pipeline.stages import Stages
-from qpsafe.recovery.stall import CALM, StallWatch
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
-from qpsafe.reference import JointReference
 from qpsafe.pipeline.resolve import Resolved
+from qpsafe.reference import JointReference
 from qpsafe.text.words import counted
 
 #: The tick went as planned.

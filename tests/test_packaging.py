@@ -41,10 +41,6 @@ def modules() -> dict[str, Path]:
     return found
 
 
-def test_packages_are_those_in_the_tree() -> None:
-    assert set(SETUPTOOLS["packages"]) == {place.rpartition("/")[0].replace("/", ".") for place in modules()}
-
-
 def test_every_folder_with_modules_is_a_package() -> None:
     """A forgotten __init__.py would leave modules out of the wheel. Scripts beside a robot's model are meant to be."""
     inside = {path.parent for path in modules().values()}
@@ -120,8 +116,8 @@ def test_constraints_pin_what_make_installs_and_name_no_host() -> None:
 def test_the_package_is_typed() -> None:
     """One marker at the top covers all subpackages (PEP 561)."""
     assert (ROOT / "qpsafe" / "py.typed").is_file()
-    assert "py.typed" in SETUPTOOLS["package-data"]["qpsafe"]
-    assert all(package.partition(".")[0] == "qpsafe" for package in SETUPTOOLS["packages"])
+    assert "py.typed" in SETUPTOOLS["package-data"]["*"]
+    assert all(package.partition(".")[0] == "qpsafe" for package in FOLDERS)
 
 
 def test_public_names_are_there_for_people_and_for_checkers() -> None:
@@ -160,7 +156,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A wheel built from a copy of the tree, without the network."""
     pytest.importorskip("setuptools", minversion="77", reason="building the wheel here needs setuptools >= 77")
     copy, out = tmp_path_factory.mktemp("tree"), tmp_path_factory.mktemp("wheel")
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, copy)
     for name in FOLDERS.values():
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]"))
@@ -193,6 +189,8 @@ def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name for name in names if name.endswith(".py")} == set(modules())
     assert {"qpsafe/py.typed", "qpsafe/tasks/task.py", "qpsafe/sim/__init__.py"} <= names
+    data = {path.relative_to(ROOT).as_posix() for path in (ROOT / "sim").rglob("*.toml")}
+    assert {f"qpsafe/{path}" for path in data} <= names
     assert {f"qpsafe/robots/irb140/{name}" for name in ("robot.xml", "robot.toml", "spots.toml")} <= names
     information = f"qpsafe-{qpsafe.__version__}.dist-info"
     assert {name.partition("/")[0] for name in names} == {"qpsafe", information}

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from qpsafe.robot.loader import load_robot
 from qpsafe.bench.clock import Row
+from qpsafe.robot.loader import load_robot
 
 MINK = "mink.solve_ik + daqp: frame, posture, limits"
 PINK = "pink.solve_ik + daqp: frame, posture, limits"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from qpsafe.bench.clock import Row
 from qpsafe.controller import SafetyController
 from qpsafe.danger.field import DangerField
 from qpsafe.laws.hierarchical import HierarchicalLaw
@@ -21,7 +22,6 @@ from qpsafe.sensing.spots import load_spots
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.trajectory import FixedPose
-from qpsafe.bench.clock import Row
 
 #: What a robot with its own sensors runs; everything else is beside it.
 MAIN = "whole tick, 20 distances"

@@ -36,8 +36,8 @@ def bench(
         return
     screen.print("Warming up (the first time, compiling the kernels takes about 15 s) ...", style="dim")
     from qpsafe.bench.clock import machine, time_rows
-    from qpsafe.bench.ticks import rows
     from qpsafe.bench.peers import MINK, PINK, mink_row, pink_row
+    from qpsafe.bench.ticks import rows
 
     timed = {**rows(), MINK: mink_row()}
     pink = pink_row()

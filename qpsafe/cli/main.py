@@ -14,7 +14,6 @@ from qpsafe.cli import (
     bench,
     calibrate,
     compare,
-    demo,
     irc5_faults,
     irc5_sim,
     place,
@@ -25,6 +24,7 @@ from qpsafe.cli import (
     stream,
 )
 from qpsafe.cli.common import Group, console
+from qpsafe.cli.demos.app import app as demos
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(
@@ -35,7 +35,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # help is plain text: "[s]" is a unit
 )
-app.add_typer(demo.app, name="demo")
+app.add_typer(demos, name="demo")
 app.command("compare")(compare.compare)
 app.add_typer(robots.app, name="robots")
 app.command("bench")(bench.bench)

@@ -14,8 +14,8 @@ import typer
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
-from qpsafe.text.json_text import json_text
 from qpsafe.placement.objective import Objective, check_request
+from qpsafe.text.json_text import json_text
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from qpsafe.text.words import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.replay.replay import Replay
     from qpsafe.sim.recording.run_file import RunFile
+    from qpsafe.sim.replay.replay import Replay
 
 
 def replay(
@@ -34,8 +34,8 @@ def replay(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.sim.replay.replay import replay as run_again
     from qpsafe.sim.recording.run_file import read_run
+    from qpsafe.sim.replay.replay import replay as run_again
     from qpsafe.sim.replay.settings import experiment_of
 
     run = read_run(file)

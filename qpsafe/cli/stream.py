@@ -109,9 +109,9 @@ def stream(
         from qpsafe.irc5.rules import SessionRules
         from qpsafe.irc5.run import run_stream
         from qpsafe.irc5.streamer import EgmStreamer
+        from qpsafe.irc5.supervisor import Supervisor
         from qpsafe.irc5.warm_up import session_limits, warm_up
         from qpsafe.irc5.watchdog import Watchdog
-        from qpsafe.irc5.supervisor import Supervisor
 
         controller = _controller(robot, program, cell, experiment, make_law(law, projection))
         blind = not sensors or controller.sensing is None

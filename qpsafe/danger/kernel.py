@@ -16,8 +16,8 @@ from math import inf, isfinite, log1p, nan, sqrt
 import numpy as np
 from numba import types
 
-from qpsafe.danger import speed as speed_module
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
+from qpsafe.danger import speed as speed_module
 from qpsafe.danger.speed import Motion, motion_of, speed_potential
 
 # `_far` is for L/(R0+R1) below this, where its error is < 1e-11; that of the closed form grows as (R/L)², 2e-11 here.

@@ -18,8 +18,8 @@ from math import isfinite, log1p, nan, sqrt
 
 from numba import types
 
-from qpsafe.danger import kernel, speed
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row, scale
+from qpsafe.danger import kernel, speed
 from qpsafe.danger.kernel import NODES, WEIGHTS, placed
 from qpsafe.danger.speed import Motion, motion_of, pole_integral
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from qpsafe.danger import evasion, field, kernel, speed, vector
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
+from qpsafe.danger import evasion, field, kernel, speed, vector
 from qpsafe.danger.evasion import act
 from qpsafe.danger.kernel import danger_field
 from qpsafe.danger.vector import vector_of

@@ -14,8 +14,8 @@ from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.realtime import resident
 from qpsafe.irc5.requests import Requests
 from qpsafe.irc5.streamer import EgmStreamer
-from qpsafe.irc5.watchdog import Watchdog
 from qpsafe.irc5.supervisor import State, StopCategory
+from qpsafe.irc5.watchdog import Watchdog
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]

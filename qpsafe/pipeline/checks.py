@@ -10,12 +10,12 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.danger.activation import Activation
-from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.compiled.compiled import Array, entry, readable
+from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
+from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.spots import SpotArray

@@ -8,12 +8,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from qpsafe.pipeline.checks import check_tasks, checked_activation, checked_barrier, checked_evasion, checked_field, checked_law
 from qpsafe.danger.activation import Activation
-from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.danger.evasion import Evasion
+from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits, checked_limits
+from qpsafe.pipeline.checks import (
+    check_tasks,
+    checked_activation,
+    checked_barrier,
+    checked_evasion,
+    checked_field,
+    checked_law,
+)
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing

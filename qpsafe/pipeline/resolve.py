@@ -2,8 +2,8 @@
 
     tasks --CLIK--> J, ẋ;   limits --> box;   J, ẋ, q̇0, activations, box --law--> q̇;   q̇ --box--> command
 
-One compiled call, see `qpsafe.pipeline.resolve_kernel`. A task, limits or a law of another making takes the place of its stage;
-the others stay the compiled ones.
+One compiled call, see `qpsafe.pipeline.resolve_kernel`. A task, limits or a law of another making takes the place of
+its stage; the others stay the compiled ones.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.pipeline.checks import check_command, checked_velocity
 from qpsafe.hqp.own.regimes import layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
+from qpsafe.pipeline.checks import check_command, checked_velocity
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.tasks.task import PoseTask
 

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from numba import types
 
 from qpsafe import limits as limits_module
-from qpsafe.pipeline.checks import ABSURD_STEP
 from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.compiled.memory import view
 from qpsafe.hqp.own import regimes as own_regimes
@@ -22,6 +21,7 @@ from qpsafe.hqp.own.solver import MODULES
 from qpsafe.laws import damping as laws_damping
 from qpsafe.laws.damping import threshold_compiled
 from qpsafe.limits import admit_into, box_into
+from qpsafe.pipeline.checks import ABSURD_STEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
 from qpsafe.tasks import clik

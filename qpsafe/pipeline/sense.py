@@ -2,8 +2,8 @@
 
     distances --(7), sensing rules--> points --(1)-(6)--> danger vectors --(8), (14), (15)--> torque --(16)--> q̇0
 
-One compiled call, see `qpsafe.pipeline.sense_kernel`. A field or an evasion of another making takes the place of its stage; the
-stages before it stay the compiled ones.
+One compiled call, see `qpsafe.pipeline.sense_kernel`. A field or an evasion of another making takes the place of its
+stage; the stages before it stay the compiled ones.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
-from qpsafe.robot.wire import Wire
 from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
+from qpsafe.robot.wire import Wire
 from qpsafe.sensing.detection import BadInput, as_floats, as_points, plausible, refuse, refuse_points
 from qpsafe.sensing.health import CLEAR
 from qpsafe.sensing.sensing import DistanceSensing

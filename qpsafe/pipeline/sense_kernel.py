@@ -18,11 +18,10 @@ from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.compiled import compiled
-
-from qpsafe.danger import push
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
-from qpsafe.danger.evasion import filter_by
 from qpsafe.compiled.memory import view
+from qpsafe.danger import push
+from qpsafe.danger.evasion import filter_by
 from qpsafe.danger.push import push_by
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, forward, wire_of

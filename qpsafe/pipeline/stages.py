@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from qpsafe.pipeline.checks import check_command
 from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.pipeline.checks import check_command
 from qpsafe.pipeline.resolve import Array, Resolve, Resolved
 from qpsafe.pipeline.sense import Seen, Sense
 

@@ -17,7 +17,8 @@ from qpsafe.placement.grid import NEAREST, lattice, looks_out, thin_out
 from qpsafe.placement.sight import SelfSight
 from qpsafe.placement.surface import Surface, link_surface
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spots import Spot, SpotArray
+from qpsafe.sensing.spot import Spot
+from qpsafe.sensing.spots import SpotArray
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

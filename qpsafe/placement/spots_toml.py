@@ -8,8 +8,8 @@ from textwrap import wrap
 
 import numpy as np
 
-from qpsafe.text.json_text import json_text
 from qpsafe.placement.candidates import Candidates
+from qpsafe.text.json_text import json_text
 
 
 def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> str:

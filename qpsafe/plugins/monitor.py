@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot
 from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
@@ -15,6 +14,7 @@ from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits, checked_limits
+from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import (

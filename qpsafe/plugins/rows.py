@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.errors import ConfigurationError
+from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.plugins.joints import JointMap
 from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.robot.robot import Robot

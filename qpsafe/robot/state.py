@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.robot.kinematics import forward, jacobian_of, pose_of, wire_of
+from qpsafe.robot.kinematics import Tree, forward, jacobian_of, pose_of, wire_of
 from qpsafe.robot.wire import Wire
 
-if TYPE_CHECKING:
-    from qpsafe.robot.robot import Robot
-
 Array = NDArray[np.float64]
+
+
+class Jointed(Protocol):
+    """What a state needs of its robot, see `qpsafe.robot.robot.Robot`."""
+
+    nq: int
+    ends: int
+    memory: int
+    tree: Tree
+    wire_frames: tuple[tuple[str, str], ...]
+    wire_indices: tuple[NDArray[np.intp], NDArray[np.intp]]
+    endless: NDArray[np.bool_]
+
+    def mounting(self, frame: str) -> tuple[int, Array]:
+        """Body and place on it of a frame."""
+        ...
+
+    def joint_vector(self, value: ArrayLike, name: str) -> Array:
+        """A checked vector (n,)."""
+        ...
 
 
 class RobotState:
@@ -30,7 +47,7 @@ class RobotState:
 
     __slots__ = ("memory", "q", "robot")
 
-    def __init__(self, robot: Robot, q: Array) -> None:
+    def __init__(self, robot: Jointed, q: Array) -> None:
         self.robot = robot
         self.q = q
         self.memory = np.empty(robot.memory)

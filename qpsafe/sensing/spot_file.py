@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from qpsafe.errors import RobotFileError
 from qpsafe.sensing.body import body_hull_set
-from qpsafe.sensing.spots import Spot
+from qpsafe.sensing.spot import Spot
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:

@@ -13,36 +13,14 @@ from numpy.typing import NDArray
 
 from qpsafe.compiled.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
+from qpsafe.sensing.spot import Spot
+from qpsafe.sensing.spot_file import read_spots
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Spot:
-    """One distance sensor.
-
-    Attributes:
-        name: Shown in reports.
-        link: Wire link that carries it, counted from 0; its danger vector acts on this link, eq. (8).
-        frame: Frame in which its pose is given: the Denavit-Hartenberg frame of that link.
-        pose: The constant matrix of eq. (7) from that frame to the spot's, whose z axis is the measuring direction,
-            (4, 4) [m].
-        range_min: Smallest distance the sensor resolves [m].
-        range_max: Largest distance that counts as a detection [m].
-        field_of_view: Full opening angle of the cone it sees [rad]. The point is always put on the cone's axis.
-    """
-
-    name: str
-    link: int
-    frame: str
-    pose: Array
-    range_min: float
-    range_max: float
-    field_of_view: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +86,6 @@ class SpotArray:
         Raises:
             RobotFileError: Names file, key and value of what is wrong.
         """
-        from qpsafe.sensing.spot_file import read_spots
-
         return cls.of(read_spots(path, robot))
 
     def subset(self, order: Sequence[int]) -> SpotArray:

@@ -13,8 +13,8 @@ import numpy as np
 from qpsafe.errors import QpsafeError
 from qpsafe.sim.drawing.caption import Caption
 from qpsafe.sim.drawing.overlay import DangerOverlay
-from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.drawing.render import VideoWriter
+from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.robot_spec import shown_groups
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tick import Tick

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, plain, save, shade
+from qpsafe.sim.recording.log import RunLog
 
 if TYPE_CHECKING:
     from qpsafe.sim.stories.story import Story

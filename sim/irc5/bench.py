@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from qpsafe.controller import SafetyController
 from qpsafe.irc5.messages import RobotPacket, encode_robot
 from qpsafe.robot.robot import Robot
+from qpsafe.sim.experiments.path.experiment import PROGRAM
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5
 from qpsafe.sim.irc5.in_process import ROBOT_ADDRESS, Here
 from qpsafe.sim.irc5.link import NO_FAULTS, Wire
 from qpsafe.sim.irc5.motion import EgmSettings
-from qpsafe.sim.experiments.path.experiment import PROGRAM
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.program_file import load_program

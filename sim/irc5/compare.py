@@ -23,12 +23,12 @@ from qpsafe.errors import QpsafeError
 from qpsafe.irc5.axes import axes_of_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments.by_name import experiment_loop
+from qpsafe.sim.experiments.pick_place.loop import PickLoop
 from qpsafe.sim.irc5.in_process import Here
 from qpsafe.sim.irc5.loop import Exchange, Irc5Loop
 from qpsafe.sim.irc5.motion import EgmSettings
 from qpsafe.sim.irc5.process import RobotRun, farewell, run_robot
 from qpsafe.sim.irc5.udp import UdpExchange
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
 
 Array = NDArray[np.float64]
 

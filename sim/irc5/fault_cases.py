@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qpsafe.irc5.messages import RobotPacket, encode_robot
+from qpsafe.irc5.supervisor import StopCategory
 from qpsafe.sim.irc5.bench import Datagrams, Workbench
 from qpsafe.sim.irc5.in_process import ROBOT_ADDRESS
 from qpsafe.sim.irc5.link import NO_FAULTS, WireFaults
@@ -23,7 +24,6 @@ from qpsafe.sim.irc5.reactions import (
     reseeded_or_stopped,
     stopped,
 )
-from qpsafe.irc5.supervisor import StopCategory
 
 STRANGER = ("127.0.0.1", 6666)
 FAR = 1000  # longer than any window

@@ -16,8 +16,8 @@ from qpsafe.placement.peak import peak_field
 from qpsafe.placement.sample import Detections
 from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.spots import SpotArray, rays_in_world
-from qpsafe.sim.placement.dummy import RADII
 from qpsafe.sim.placement.draw import draw_pairs
+from qpsafe.sim.placement.dummy import RADII
 from qpsafe.sim.placement.world import PlacementWorld
 
 CHUNK = 256  # pairs of a piece; a multiple of 8

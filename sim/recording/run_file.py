@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
-from qpsafe.text.json_text import json_text
 from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
+from qpsafe.text.json_text import json_text
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:

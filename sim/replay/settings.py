@@ -19,16 +19,16 @@ from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.recovery.recovery import RecoveryRules
 from qpsafe.robot.loader import bundled_robots, load_robot
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.loop import FixedLoop
 from qpsafe.sim.experiments.path.experiment import PathExperiment
-from qpsafe.sim.people.person import Board, Person
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.experiments.pick_place.loop import PickLoop
+from qpsafe.sim.people.choreography import Approach, Choreography
+from qpsafe.sim.people.person import Board, Person
 from qpsafe.sim.replay.settings_pick import KIND, pick_of, pick_settings
-from qpsafe.sim.stories.story import StepProblem, Story
 from qpsafe.sim.stories.steps import StoryTable
+from qpsafe.sim.stories.story import StepProblem, Story
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

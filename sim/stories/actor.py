@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from qpsafe.sim.people.footsteps import Footsteps
 from qpsafe.sim.people.person import Foot, PersonPose
-from qpsafe.sim.stories.planning import Plan, Taken
 from qpsafe.sim.people.posture import Arm, Posture, Stoop
-from qpsafe.sim.stories.timeline import Change
 from qpsafe.sim.people.walker import Root, eased
+from qpsafe.sim.stories.planning import Plan, Taken
+from qpsafe.sim.stories.timeline import Change
 
 WALK_RATIO = 0.0065  # step length [m] over cadence [steps/min], the same at all usual speeds: Sekiya et al. 1996
 STEP = 0.55, 0.40  # longest and shortest time of a step; Footsteps' own is the longest [s]

@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.stories.story import StepProblem, Story
 from qpsafe.sim.stories.steps import KINDS, StoryTable
+from qpsafe.sim.stories.story import StepProblem, Story
 from qpsafe.text.toml_text import TomlText
 
 __all__ = ["StoryError", "load_story", "parse_story"]

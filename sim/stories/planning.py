@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 from qpsafe.errors import QpsafeError
 from qpsafe.sim.people.posture import EDGE, HANG, Point
+from qpsafe.sim.people.walker import SHARP
 from qpsafe.sim.stories.steps import PersonTable
 from qpsafe.sim.stories.timeline import FARTHER, LOOK, TimeLine
-from qpsafe.sim.people.walker import SHARP
 
 
 class StepProblem(QpsafeError, ValueError):

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from qpsafe.sim.stories.actor import Actor
 from qpsafe.sim.people.person import Person, PersonPose
+from qpsafe.sim.stories.actor import Actor
 from qpsafe.sim.stories.planning import StepProblem, Taken
 from qpsafe.sim.stories.steps import PersonTable, StoryTable, WaitStep, WalkStep
 

@@ -11,8 +11,8 @@ import numpy as np
 from qpsafe.sim.people.anatomy import Body
 from qpsafe.sim.people.person import Board, Person
 from qpsafe.sim.people.posture import EDGE, HANG, Arm, Point, Posture, Stoop
-from qpsafe.sim.stories.steps import PersonTable
 from qpsafe.sim.people.walker import TURNING, Course, Turn, Walk
+from qpsafe.sim.stories.steps import PersonTable
 
 FARTHER = 0.15  # what is put down stands farther away than it is carried, past the knees [m]
 SETTLE = 0.4  # time that the feet take after the root has stopped [s]

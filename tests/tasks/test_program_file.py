@@ -7,8 +7,8 @@ import pytest
 
 import qpsafe
 from qpsafe.cli.stream import _controller
-from qpsafe.text.lines import line_of
 from qpsafe.tasks.program_file import ProgramError, load_program
+from qpsafe.text.lines import line_of
 
 robot = qpsafe.load_robot("irb140")
 GOOD = """# pick, lift, carry, drop

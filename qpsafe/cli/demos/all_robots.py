@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-    from qpsafe.sim.experiments.shared.report import Report
     from qpsafe.sim.experiments.fixed.table import RobotRow
+    from qpsafe.sim.experiments.shared.report import Report
 
 
 def every_robot(

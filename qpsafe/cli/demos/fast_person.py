@@ -40,7 +40,7 @@ def fast_person(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.cli.demos.watching import observed
     from qpsafe.errors import ConfigurationError
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.fast_person import EXPERIMENTS, SPEEDS, fast_figure, runs

@@ -1,16 +1,13 @@
-"""`qpsafe demo`: the source's experiments in MuJoCo."""
+"""`qpsafe demo fixed`: the first experiment in MuJoCo."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from qpsafe.cli.common import (
-    Group,
     LawName,
     ProjectionName,
     SensorName,
@@ -21,26 +18,19 @@ from qpsafe.cli.common import (
     show_checks,
     write_text,
 )
-from qpsafe.cli.demos.fast_person import fast_person
-from qpsafe.cli.demos.path import path
-from qpsafe.cli.demos.pick_and_place import pick_and_place
+from qpsafe.cli.demos.watching import observed
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
 
-    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, Observer
-    from qpsafe.sim.recording.log import RunLog
+    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
     from qpsafe.sim.experiments.shared.report import Report
-    from qpsafe.sim.recording.run_file import StateRecorder
-
-app = typer.Typer(cls=Group, help="Run the source's experiments in MuJoCo.", no_args_is_help=True)
+    from qpsafe.sim.recording.log import RunLog
 
 
-@app.command()
 def fixed(
     robot: Annotated[
         str, typer.Option(help="A bundled robot, a robot folder with spots, or 'all': one table over all bundled ones.")
@@ -148,61 +138,12 @@ def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen
     return log, filmed
 
 
-@contextmanager
-def observed(
-    experiment: FixedExperiment,
-    path: Path,
-    video: bool,
-    view: bool,
-    screen: Console,
-    progress: Progress,
-    label: str,
-    states: StateRecorder | None = None,
-) -> Iterator[tuple[Observer, bool]]:
-    """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not."""
-    from qpsafe.danger.thresholds import robot_activation
-    from qpsafe.errors import MissingExtraError
-    from qpsafe.sensing.spots import load_spots
-    from qpsafe.sim.drawing.film import Film, Viewer
-    from qpsafe.sim.drawing.gl import gl_available
-
-    spots = load_spots(experiment.robot)
-    assert spots is not None
-    activation = robot_activation(experiment.robot)
-    with ExitStack() as stack:
-        observers: list[Any] = [] if states is None else [states.observe]
-        filmed = False
-        if video and not view:
-            available, reason = gl_available()
-            try:
-                if available:
-                    film = Film(path, experiment.scene, spots, activation)
-                    observers.append(stack.enter_context(film).observe)
-                    filmed = True
-            except MissingExtraError as error:
-                available, reason = False, str(error)
-            if not available:
-                screen.print(f"no video: {reason}", style="yellow")
-        if view:
-            viewer = Viewer(experiment.scene, spots, activation)
-            stack.callback(viewer.close)
-            observers.append(viewer.observe)
-        task = progress.add_task(label, total=round(experiment.duration / 0.004))
-
-        def observe(*state: Any) -> None:
-            for observer in observers:
-                observer(*state)
-            progress.advance(task)
-
-        yield observe, filmed
-
-
 def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> Report:
     """Write csv, figures and report, each whole or not at all."""
     from qpsafe.danger.thresholds import robot_activation
     from qpsafe.sim.drawing.plots import distance_figure, figure_11
-    from qpsafe.sim.experiments.shared.report import summarise
     from qpsafe.sim.drawing.stories import encounter_figure
+    from qpsafe.sim.experiments.shared.report import summarise
 
     without = experiment.board_distance_without_controller()
     report = summarise(log, without, experiment.walk.windows, experiment.robot)
@@ -256,8 +197,3 @@ def show(report: Report, title: str, screen: Console) -> None:
         f"largest gap between commanded and measured tool pose: {1e3 * position:.2f} mm, {orientation:.4f} rad; "
         f"ticks with a message: {report.unusual[0]}" + (f" (mostly: {report.unusual[1]})" if report.unusual[0] else "")
     )
-
-
-app.command()(path)
-app.command("fast-person")(fast_person)
-app.command("pick-and-place")(pick_and_place)

@@ -42,16 +42,16 @@ def path(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.cli.demos.watching import observed
     from qpsafe.laws.hierarchical import HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw
     from qpsafe.recovery.recovery import RecoveryRules
     from qpsafe.robot.loader import load_robot
+    from qpsafe.sim.drawing.plots import figure_11
     from qpsafe.sim.experiments.encounter import encounter
     from qpsafe.sim.experiments.path.experiment import PROGRAM, PathExperiment
     from qpsafe.sim.experiments.path.plots import side_by_side
     from qpsafe.sim.experiments.path.report import figures, promises, to_dict
-    from qpsafe.sim.drawing.plots import figure_11
     from qpsafe.sim.recording.run_file import StateRecorder, write_run
     from qpsafe.sim.replay.settings import settings_of
     from qpsafe.sim.stories.file import load_story

@@ -66,10 +66,11 @@ def pick_and_place(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.pick_place.cell import PROGRAM
-    from qpsafe.sim.experiments.pick_place.experiment import PEOPLE, PickPlaceExperiment
+    from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
     from qpsafe.sim.experiments.pick_place.plots import seeds_figure
     from qpsafe.sim.experiments.pick_place.report import figures, promises, to_dict
     from qpsafe.sim.experiments.pick_place.seeds import run_seeds
+    from qpsafe.sim.experiments.pick_place.settings import PEOPLE
 
     experiment = PickPlaceExperiment(
         load_robot("irb140"),
@@ -112,7 +113,7 @@ def _first(
     experiment: PickPlaceExperiment, out: Path, video: bool, view: bool, screen: Console, progress: object
 ) -> PickRun:
     """The run that is shown, filmed if wanted."""
-    from qpsafe.cli.demos.fixed import observed
+    from qpsafe.cli.demos.watching import observed
     from qpsafe.sim.recording.run_file import StateRecorder, write_run
     from qpsafe.sim.replay.settings import settings_of
 

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from qpsafe.compiled.compiled import inline
 from qpsafe.compiled.by_reference import by_reference
+from qpsafe.compiled.compiled import inline
 from qpsafe.hqp.own.damping import WITH, WITHOUT
 from qpsafe.hqp.own.level import minimise_level
 from qpsafe.hqp.own.linear import Array, Index, dot

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from qpsafe.compiled import by_reference as reference
 from qpsafe.compiled.compiled import entry, linked
-from qpsafe.hqp.own import damping as own_damping, hierarchy as own_hierarchy, level as own_level, linear as own_linear, rules as own_rules, state as own_state
+from qpsafe.hqp.own import damping as own_damping
+from qpsafe.hqp.own import hierarchy as own_hierarchy
+from qpsafe.hqp.own import level as own_level
+from qpsafe.hqp.own import linear as own_linear
+from qpsafe.hqp.own import rules as own_rules
+from qpsafe.hqp.own import state as own_state
 from qpsafe.hqp.own.hierarchy import HEADER, run
 from qpsafe.hqp.own.state import workspace
 

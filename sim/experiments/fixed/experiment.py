@@ -4,98 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import RobotFileError
-from qpsafe.laws.problem import Law
-from qpsafe.sim.people.choreography import Choreography
-from qpsafe.sim.world.distance import board_distance, person_distance
-from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.settings import FixedSettings
+from qpsafe.sim.recording.log import Recorder, RunLog
+from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.world.plant import Plant
-from qpsafe.sim.experiments.fixed.stage import robot_stage
-from qpsafe.sim.world.scene import Scene, build_scene
+from qpsafe.sim.world.scene import Scene
 from qpsafe.tasks.rotation import euler_zyx, log3
-from qpsafe.tasks.trajectory import FixedPose, Trajectory
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
-    from qpsafe.recovery.recovery import RecoveryRules
-    from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.rules import SensingRules
-    from qpsafe.sim.stories.story import Story
+    pass
 
 Observer = Callable[[Tick, Scene, Plant], None]
 
 
 @dataclass
-class FixedExperiment:
-    """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
-
-    Attributes:
-        robot: The robot, with spots.
-        law: The law, None for the controller's default.
-        seed: Varies the person's distances, directions and times a little; 0 is nominal.
-        lag: Control lag of the plant [s].
-        limits: Whether the joint limits are on.
-        duration: Length [s].
-        sensor: ``ideal`` distances, or those of ``sharp`` sensors.
-        rules: What counts as danger, and what sick sensors do; None for the controller's default.
-        cap: Cap on the danger field (`DangerBarrier`), None for none.
-        choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
-        recovery: How the robot returns to its path; None for the controller's default.
-        story: Who does what instead of the choreography; `seed` varies it too.
-    """
-
-    robot: Robot
-    law: Law | None = None
-    seed: int = 0
-    lag: float = 0.0
-    limits: bool = True
-    duration: float = 60.0
-    sensor: str = "ideal"
-    rules: SensingRules | None = None
-    cap: float | None = None
-    choreography: Choreography = None  # type: ignore[assignment]  # set below: it depends on the robot
-    recovery: RecoveryRules | None = None
-    story: Story | None = None
-
-    def __post_init__(self) -> None:
-        if self.robot.spots_path is None:
-            raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
-        if self.choreography is None:
-            self.choreography = robot_stage(self.robot).choreography
-
-    @cached_property
-    def scene(self) -> Scene:
-        """The world, built on first use."""
-        floor = self.choreography.person.floor if self.story is None else self.story.floor
-        return build_scene(self.robot, pedestal=-floor, people=self.walk.persons)
-
-    @cached_property
-    def walk(self) -> Choreography | Story:
-        """The choreography, or the story, as this seed varies it."""
-        return (self.story or self.choreography).varied(self.seed)
-
-    @cached_property
-    def reference(self) -> Trajectory:
-        """What the first tool is to follow: in this experiment, to stay where it is."""
-        return FixedPose(self.robot.pose(self.robot.tool_frames[0], self.robot.home))
-
-    @cached_property
-    def references(self) -> dict[str, Trajectory]:
-        """What every tool is to follow: the others stay where they are."""
-        first, *others = self.robot.tool_frames
-        return {first: self.reference} | {name: FixedPose(self.robot.pose(name, self.robot.home)) for name in others}
-
-    @property
-    def start(self) -> NDArray[np.float64]:
-        """Joint positions at the beginning (n,) [rad]."""
-        return self.robot.home
+class FixedExperiment(FixedSettings):
+    """The first experiment with one set of settings, see `FixedSettings`; equal ones give bit-identical logs."""
 
     def run(self, observer: Observer | None = None) -> RunLog:
         """Run it with the controller.
@@ -138,10 +69,6 @@ class FixedExperiment:
             scene.place_people(data, walk.poses(k * dt))
             result[k] = board_distance(scene, data).distance
         return result
-
-    def windows(self) -> tuple[tuple[float, float], ...]:
-        """Start and end of each approach that fits into the duration [s]."""
-        return tuple(window for window in self.walk.windows if window[1] <= self.duration)
 
 
 def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[NDArray, NDArray]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
-from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.danger.thresholds import robot_activation
+from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.robot.state import RobotState
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
@@ -22,7 +22,7 @@ from qpsafe.tasks.task import Task
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
-    from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+    from qpsafe.sim.experiments.fixed.settings import FixedSettings
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class FixedLoop:
         experiment: Its settings.
     """
 
-    def __init__(self, experiment: FixedExperiment) -> None:
+    def __init__(self, experiment: FixedSettings) -> None:
         robot, scene = experiment.robot, experiment.scene
         self.scene, self.walk = scene, experiment.walk
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, Observer
+from qpsafe.sim.experiments.shared.programmed import Programmed
+from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.world.plant import Plant
-from qpsafe.sim.experiments.shared.programmed import Programmed
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tick import Tick
 

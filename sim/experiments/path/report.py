@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.text.json_text import plain
 from qpsafe.recovery.recovery import FOLLOWING
 from qpsafe.sim.experiments.path.experiment import PathRun
 from qpsafe.sim.experiments.shared.report import Check, split
+from qpsafe.text.json_text import plain
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.laws.problem import Law
-from qpsafe.sim.stories.actor import Actor
-from qpsafe.sim.experiments.pick_place.cell import PROGRAM, Cell
+from qpsafe.sim.experiments.fixed.experiment import Observer, euler_error, pose_error
+from qpsafe.sim.experiments.pick_place.loop import RELEASE, PickEvent, PickLoop, motion
+from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
+from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.clearance import Furniture
 from qpsafe.sim.world.distance import person_distance
-from qpsafe.sim.experiments.fixed.experiment import Observer, euler_error, pose_error
-from qpsafe.sim.recording.log import Recorder, RunLog
-from qpsafe.sim.experiments.pick_place.loop import RELEASE, SETTLE, PickEvent, PickLoop, motion
-from qpsafe.sim.experiments.pick_place.people import load_people
-from qpsafe.sim.experiments.shared.programmed import Programmed
-from qpsafe.sim.world.scene import Scene, build_scene
 
 if TYPE_CHECKING:
-    from qpsafe.recovery.recovery import RecoveryRules
-    from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.rules import SensingRules
-    from qpsafe.sim.stories.story import Story
+    pass
 
-#: The bundled people.
-PEOPLE = Path(__file__).with_name("pick_people.toml")
 STATES = 10  # ticks between two states that are kept for pictures
 
 
@@ -72,68 +60,8 @@ class PickRun:
 
 
 @dataclass
-class PickPlaceExperiment(Programmed):
-    """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
-
-    Attributes:
-        robot: The robot, with spots.
-        law: The law, None for the controller's default.
-        seed: Varies when, how fast and where people go, and where they reach; 0 is nominal.
-        cycles: Screws to carry.
-        people_file: TOML file of the people, None for nobody.
-        brought: How many screws each person of the file brings along.
-        lag: Control lag of the plant [s].
-        limit: The run is given up after this time [s].
-        sensor: ``ideal`` distances, or those of ``sharp`` sensors.
-        rules: What counts as danger; None for the controller's default.
-        recovery: How the robot returns to its path; None for the controller's default.
-        program: TOML file of what the tool does, with the events ``grip`` and ``release``.
-    """
-
-    robot: Robot
-    law: Law | None = None
-    seed: int = 0
-    cycles: int = 10
-    people_file: Path | None = PEOPLE
-    brought: tuple[int, ...] = (0, 3)
-    lag: float = 0.0
-    limit: float = 300.0
-    sensor: str = "ideal"
-    rules: SensingRules | None = None
-    recovery: RecoveryRules | None = None
-    program: Path = PROGRAM
-
-    @property
-    def duration(self) -> float:
-        """About how long a run takes, for progress bars [s]."""
-        delayed = 1.1 if self.story is None else 1.5
-        return delayed * self.cycles * self.reference.duration / len(self.cell.holes) + SETTLE
-
-    @cached_property
-    def story(self) -> Story | None:
-        """The people's story as this seed varies it."""
-        return None if self.people_file is None else load_people(self.people_file, self.seed)
-
-    @property
-    def people(self) -> tuple[Actor, ...]:
-        """Who is there."""
-        return () if self.story is None else self.story.people
-
-    @property
-    def carried(self) -> tuple[int, ...]:
-        """Screws that each person brings."""
-        return tuple((*self.brought, *([0] * len(self.people)))[: len(self.people)])
-
-    @cached_property
-    def cell(self) -> Cell:
-        """The cell, with as many screws as there are."""
-        return Cell(carried=sum(self.carried))
-
-    @cached_property
-    def scene(self) -> Scene:
-        """The world, built on first use."""
-        people = () if self.story is None else self.story.persons
-        return build_scene(self.robot, people=people, furnish=self.cell.furnish)
+class PickPlaceExperiment(PickPlaceSettings):
+    """The third experiment with one set of settings, see `PickPlaceSettings`; equal ones give bit-identical logs."""
 
     def run(self, observer: Observer | None = None) -> PickRun:
         """Run it with the controller, until the last screw lies in the box or `limit` is over.

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
 from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sim.experiments.fixed.loop import Moment
 from qpsafe.sim.experiments.pick_place.cell import Parts, Screw
 from qpsafe.sim.experiments.pick_place.gripper import Gripper
 from qpsafe.sim.experiments.pick_place.handwork import Handwork
-from qpsafe.sim.world.known import known_obstacles
-from qpsafe.sim.experiments.fixed.loop import Moment
+from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
 from qpsafe.sim.people.person import PersonPose
+from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
-
-if TYPE_CHECKING:
-    from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 
 #: A screw in the gripper: its head's top at the tip, its shank ahead.
 SCREW = Obstacle.box(
@@ -32,7 +30,6 @@ SCREW = Obstacle.box(
 )
 GRIP, RELEASE = "grip", "release"  # events of the program
 AT_REST = 1.5  # people who wait stand still from so long after they came to until as long before they go [s]
-SETTLE = 1.0  # a run goes on for this long after its last release, so that the last screw comes to rest [s]
 SETTLED = 0.02  # a screw slower than this rests [m/s]
 
 
@@ -60,7 +57,7 @@ class PickLoop:
         experiment: Its settings.
     """
 
-    def __init__(self, experiment: PickPlaceExperiment) -> None:
+    def __init__(self, experiment: PickPlaceSettings) -> None:
         scene, robot, cell = experiment.scene, experiment.robot, experiment.cell
         self.scene, self.cell, self.people = scene, cell, experiment.people
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from qpsafe.sim.stories.story import Story
 from qpsafe.sim.stories.file import load_story
 from qpsafe.sim.stories.steps import PersonTable, ReachStep, WalkStep
+from qpsafe.sim.stories.story import Story
 
 STAND, REACH = 0.04, 0.02  # how far people stand and reach from where the file says, to each side [m]
 

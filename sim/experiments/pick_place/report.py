@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.text.json_text import plain
 from qpsafe.sim.experiments.pick_place.experiment import PickRun
 from qpsafe.sim.experiments.shared.report import Check
+from qpsafe.text.json_text import plain
 from qpsafe.text.words import counted
 
 STANDSTILL = 1e-3  # a robot that moves slower than this stands still [m/s]

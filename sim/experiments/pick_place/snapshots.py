@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.experiments.pick_place.experiment import STATES, PickPlaceExperiment, PickRun
+from qpsafe.sim.recording.log import RunLog
 
 if TYPE_CHECKING:
     from qpsafe.sim.drawing.render import Camera
@@ -103,9 +103,9 @@ def draw(experiment: PickPlaceExperiment, run: PickRun, path: Path) -> list[Mome
     """
     import matplotlib
 
-    from qpsafe.sim.experiments.pick_place.cell import CAMERA
     from qpsafe.sim.drawing.plots import STYLE, save
     from qpsafe.sim.drawing.render import Camera
+    from qpsafe.sim.experiments.pick_place.cell import CAMERA
 
     found = moments(run)
     if not found:

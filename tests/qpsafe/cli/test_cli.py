@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from qpsafe import __version__
+from qpsafe.bench.clock import BLOCK, Row, time_rows
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
 from qpsafe.sim.recording.run_file import read_run
-from qpsafe.bench.clock import BLOCK, Row, time_rows
 
 run = CliRunner().invoke
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.drawing.stories import plan_figure
 from qpsafe.sim.experiments.fast_person import STORY, at_speed
 from qpsafe.sim.stories.file import StoryError, load_story
-from qpsafe.sim.drawing.stories import plan_figure
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLE = ROOT / "examples" / "two_people.toml"

@@ -14,7 +14,6 @@ import pytest
 import typer.main
 
 from qpsafe.cli import common, main
-
 from qpsafe.cli.demos import fixed as demo
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot

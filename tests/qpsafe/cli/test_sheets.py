@@ -49,8 +49,8 @@ Show = Callable[[Console, Path], None]
 
 def of_bench(screen: Console, folder: Path) -> None:
     from qpsafe.bench.clock import Times
-    from qpsafe.bench.ticks import rows
     from qpsafe.bench.peers import MINK
+    from qpsafe.bench.ticks import rows
 
     names = [*rows(), MINK]
     times = Times(20_000, 57.1e-6, 103.4e-6, 1234.5e-6, 123456.7e-6, 0.55, 0.53, 0.57)
@@ -147,8 +147,8 @@ def of_faults(screen: Console, folder: Path) -> None:
 
 
 def of_sick(screen: Console, folder: Path) -> None:
-    from qpsafe.sim.sick.matrix import Result
     from qpsafe.sim.sick.cases import CASES
+    from qpsafe.sim.sick.matrix import Result
 
     results = [Result(c.name, c.promise, 90, 200, 199, 84, 123, 12, 1.2e-3, -0.123, 0.234) for c in CASES]
     sick_sensors.show(results, screen)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numba import types
 
+from qpsafe.bench.compilation import PACKAGES, modules
+from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import OPTIONS, entry, inline, seconds
 from qpsafe.compiled.memory import view
-from qpsafe.compiled.by_reference import by_reference
-from qpsafe.bench.compilation import PACKAGES, modules
 
 
 def mixed(a: np.ndarray, b: np.ndarray, k: int) -> float:

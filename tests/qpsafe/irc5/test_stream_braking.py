@@ -23,10 +23,10 @@ from qpsafe.irc5.requests import LEAVE, Requests
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.run import CHECK, StreamRun, run_stream
 from qpsafe.irc5.session import Cycle, EgmSession
+from qpsafe.irc5.supervisor import State, Supervisor, Transition
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5
-from qpsafe.irc5.supervisor import State, Supervisor, Transition
 from qpsafe.tick import OK
 
 ROBOT = qpsafe.load_robot("irb140")

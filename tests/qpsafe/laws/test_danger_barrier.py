@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.errors import ConfigurationError
+from qpsafe.laws.barrier import DangerBarrier
 
 ROBOT = qpsafe.load_robot("irb140")
 FIELD = qpsafe.DangerField()

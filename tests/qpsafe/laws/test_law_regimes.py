@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.pipeline.checks import checked_velocity
 from qpsafe.laws.problem import LawProblem, TaskVelocity
+from qpsafe.pipeline.checks import checked_velocity
 from qpsafe.pipeline.resolve import Resolve, Resolved, judged
 from qpsafe.tasks.task import Task
 from qpsafe.tasks.trajectory import Sample

@@ -7,11 +7,11 @@ import matplotlib.text
 import pytest
 
 import qpsafe
+from qpsafe.sim.drawing.plots import figure_11
+from qpsafe.sim.drawing.stories import encounter_figure, plan_figure
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.recording.log import RunLog
-from qpsafe.sim.drawing.plots import figure_11
 from qpsafe.sim.stories.file import parse_story
-from qpsafe.sim.drawing.stories import encounter_figure, plan_figure
 
 NAMES = ("$x$", r"cost $5, $\foo$, $\frac$, a_{b}^c, 100 %")
 STORY = """

@@ -9,9 +9,9 @@ from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.drawing import gl
 from qpsafe.sim.drawing.caption import Caption, CaptionStrip
-from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.drawing.overlay import GREEN, RED, YELLOW, DangerOverlay, danger_colour
 from qpsafe.sim.drawing.render import Camera, VideoWriter, gl_available
+from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.world.scene import build_scene
 
 AVAILABLE, WHY_NOT = gl_available()

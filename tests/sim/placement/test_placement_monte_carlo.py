@@ -14,11 +14,11 @@ import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement.candidates import Candidates, candidate_nodes
 from qpsafe.placement.sample import Sample
-from qpsafe.sim.placement import cast as placement_cast
 from qpsafe.sim.people.anatomy import SEGMENTS
-from qpsafe.sim.placement.dummy import DRAWS, RADII, dummies
+from qpsafe.sim.placement import cast as placement_cast
 from qpsafe.sim.placement.cast import cast_pairs, pieces
 from qpsafe.sim.placement.draw import draw_pairs
+from qpsafe.sim.placement.dummy import DRAWS, RADII, dummies
 from qpsafe.sim.placement.run import MonteCarlo
 from qpsafe.sim.placement.world import PlacementWorld
 

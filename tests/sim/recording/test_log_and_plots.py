@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import qpsafe
+from qpsafe.sim.drawing.plots import distance_figure, figure_11
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, euler_error, pose_error
 from qpsafe.sim.recording.log import RunLog, intervals
-from qpsafe.sim.drawing.plots import distance_figure, figure_11
 from qpsafe.tasks.rotation import exp3
 
 ROBOT = qpsafe.load_robot("irb140")

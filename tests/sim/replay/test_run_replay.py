@@ -16,13 +16,23 @@ from hypothesis import strategies as st
 import qpsafe
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.experiments.encounter import encounter
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.path.experiment import PathExperiment
-from qpsafe.sim.experiments.pick_place.experiment import PEOPLE, PickPlaceExperiment
+from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.experiments.pick_place.settings import PEOPLE
+from qpsafe.sim.people.choreography import Approach, Choreography
+from qpsafe.sim.recording.run_file import (
+    INPUTS,
+    OUTPUTS,
+    RunFile,
+    RunFileError,
+    StateRecorder,
+    _digest,
+    read_run,
+    write_run,
+)
 from qpsafe.sim.replay.replay import replay
-from qpsafe.sim.recording.run_file import INPUTS, OUTPUTS, RunFile, RunFileError, StateRecorder, _digest, read_run, write_run
 from qpsafe.sim.replay.settings import experiment_of, settings_of
 from qpsafe.sim.replay.stage import Stage
 from qpsafe.sim.stories.file import parse_story

@@ -7,11 +7,11 @@ import pytest
 import typer
 
 import qpsafe
-from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.loop import FixedLoop
-from qpsafe.sim.sick.matrix import Result, run_matrix
+from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.sick.cases import CASES
+from qpsafe.sim.sick.matrix import Result, run_matrix
 
 ROBOT = qpsafe.load_robot("irb140")
 BRIEF = Choreography(

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.sim.people.anatomy import HEIGHTS, SEGMENTS, Body
-from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.people.person import Person
 from qpsafe.sim.people.posture import Arm, Posture, Stoop
-from qpsafe.sim.world.scene import build_scene
-from qpsafe.sim.stories.story import Story
 from qpsafe.sim.stories.file import StoryError, load_story, parse_story
+from qpsafe.sim.stories.story import Story
+from qpsafe.sim.world.distance import board_distance, person_distance
+from qpsafe.sim.world.scene import build_scene
 
 TEXT = """
 [[person]]

@@ -12,10 +12,10 @@ import pytest
 
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
+from qpsafe.sim.people.person import Board
 from qpsafe.sim.world.clearance import Furniture
 from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.world.known import known_obstacles
-from qpsafe.sim.people.person import Board
 from qpsafe.sim.world.robot_spec import shown_groups
 from qpsafe.sim.world.scene import ROBOT_COLLISION, SCENERY, build_scene
 

@@ -4,8 +4,8 @@ import numpy as np
 
 import qpsafe
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
-from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.experiments.fixed.compare import Shadow, compare_closed_loop
+from qpsafe.sim.people.choreography import Approach, Choreography
 
 #: Somebody comes so fast that the robot cannot evade within its limits.
 HASTE = Choreography(

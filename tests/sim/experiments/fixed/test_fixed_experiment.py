@@ -9,10 +9,10 @@ import pytest
 import qpsafe
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.world.known import known_obstacles
-from qpsafe.sim.recording.log import RunLog, intervals
-from qpsafe.sim.experiments.shared.report import summarise
 from qpsafe.sim.experiments.fixed.stage import robot_stage
+from qpsafe.sim.experiments.shared.report import summarise
+from qpsafe.sim.recording.log import RunLog, intervals
+from qpsafe.sim.world.known import known_obstacles
 
 LEVEL = {"low": 0, "medium": 1, "high": 2}
 ROBOT = qpsafe.load_robot("irb140")

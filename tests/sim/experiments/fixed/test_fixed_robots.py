@@ -10,11 +10,11 @@ import pytest
 import qpsafe
 from qpsafe.errors import RobotFileError
 from qpsafe.robot.loader import bundled_robots
-from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.experiments.shared.report import summarise
 from qpsafe.sim.experiments.fixed.stage import CLOSE_GAP, MEDIUM_GAP, robot_stage
 from qpsafe.sim.experiments.fixed.table import robot_row
+from qpsafe.sim.experiments.shared.report import summarise
+from qpsafe.sim.people.choreography import Choreography
 
 ROBOTS = {name: qpsafe.load_robot(name) for name in bundled_robots()}
 

@@ -11,14 +11,15 @@ import pytest
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.experiments.pick_place.cell import PROGRAM
 from qpsafe.sim.drawing.gl import gl_available
+from qpsafe.sim.experiments.pick_place.cell import PROGRAM
+from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment, PickRun
 from qpsafe.sim.experiments.pick_place.loop import PickLoop
 from qpsafe.sim.experiments.pick_place.people import load_people
-from qpsafe.sim.experiments.pick_place.experiment import PEOPLE, PickPlaceExperiment, PickRun
 from qpsafe.sim.experiments.pick_place.plots import seeds_figure, timeline
 from qpsafe.sim.experiments.pick_place.report import cost, figures, promises, spread, to_dict
 from qpsafe.sim.experiments.pick_place.seeds import run_seeds
+from qpsafe.sim.experiments.pick_place.settings import PEOPLE
 from qpsafe.sim.experiments.pick_place.snapshots import draw, moments, visits
 
 ROBOT = qpsafe.load_robot("irb140")
