@@ -43,14 +43,12 @@ from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.speed_cap import slowed
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
+from qpsafe.tasks.task import Task, errors_of
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.tasks.task import Task
 
-#: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint, tuned on the first experiment.
-DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
 _WAY_LAW = HierarchicalLaw()
 
 
@@ -102,7 +100,7 @@ class SafetyController(Parts):
         self._law = HierarchicalLaw() if law is None else checked_law(law)
         self._field = DangerField() if field is None else checked_field(field)
         self._activation = checked_activation(self._tasks, activation, robot)
-        self.evasion = Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self._dt) if evasion is None else evasion
+        self.evasion = Evasion.default(robot.nq, self._dt) if evasion is None else evasion
         self.limits = limits
         self._spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
         self._rules = SensingRules() if sensing is None else sensing
@@ -148,14 +146,6 @@ class SafetyController(Parts):
         if self._sensing is not None:
             self._sensing.acknowledge()
         self._units.acknowledge()
-
-    def pause(self) -> None:
-        """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
-        self._recovery.paused = True
-
-    def resume(self) -> None:
-        """Let the path's clock run again."""
-        self._recovery.paused = False
 
     def step(
         self,
@@ -269,7 +259,7 @@ class SafetyController(Parts):
             waits_for=recovery.waits_for,
             joint_names=self._robot.joint_names,
             resolved=resolved,
-            off_path=None if recovery.on_path else _errors(self._tasks, commanded, recovery.path_time),
+            off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )
 
     @property
@@ -308,8 +298,3 @@ class SafetyController(Parts):
         self._q = reference.q.copy()
         self._q.flags.writeable = False  # tasks of any kind will see it
         self._recovery.pass_events()
-
-
-def _errors(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
-    """Errors against the tasks' own trajectories, not against the way back to them."""
-    return tuple([np.array(task.error(task.value(state), task.trajectory.sample(time))) for task in tasks])

@@ -85,6 +85,10 @@ def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
             after[i] += A[i, j] * before[j] + B[i, j] * sigma[j]
 
 
+#: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint where nothing else is said.
+DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
+
+
 class Evasion:
     """Mass-damper admittance q̇0 = (M s + D)^-1 σ, eq. (16), sampled exactly for a held input.
 
@@ -112,6 +116,11 @@ class Evasion:
         for array in (self._mass, self._damping, self._A, self._B):
             array.flags.writeable = False
         self.velocity = np.zeros(n)
+
+    @classmethod
+    def default(cls, n: int, dt: float) -> Evasion:
+        """That of a controller which is given none, tuned on the first experiment."""
+        return cls(DEFAULT_MASS, DEFAULT_DAMPING, n, dt)
 
     @property
     def mass(self) -> NDArray[np.float64]:

@@ -175,3 +175,11 @@ class Parts:
         activation = checked_activation(tuple(tasks), activation, self._robot)
         self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
         self._tasks, self._activation = tuple(tasks), activation
+
+    def pause(self) -> None:
+        """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
+        self._recovery.paused = True
+
+    def resume(self) -> None:
+        """Let the path's clock run again."""
+        self._recovery.paused = False

@@ -63,7 +63,7 @@ class Stages:
         """
         state, qd = self._robot.at(measured), given[1]
         level = barrier.level(state, qd, seen.points, seen.danger)
-        resolved = resolve(*given, (level,) if level else ())
+        resolved = resolve(*given, soft=(level,) if level else ())
         # exact, as far as the acceleration limits allow
         command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
         resolved.command = command if resolved.box is None else resolved.box.clip(command)

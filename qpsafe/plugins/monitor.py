@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.controller import DEFAULT_DAMPING, DEFAULT_MASS
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
@@ -82,7 +81,7 @@ class DangerMonitor:
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
         if not isinstance(self.activation, Activation):
             raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
-        own = Evasion(DEFAULT_MASS, DEFAULT_DAMPING, robot.nq, self.dt) if evasion is None else evasion
+        own = Evasion.default(robot.nq, self.dt) if evasion is None else evasion
         self.evasion = checked_evasion(own, robot, self.dt)
         self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
         self.ramp = float(ramp)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.recovery.events import Cursor
 from qpsafe.recovery.returns import RecoveryRules, Return, minimum_jerk, run_out
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.trajectory import FixedJoints
@@ -56,9 +57,9 @@ class Recovery:
         self._rate = 1.0  # of the clock
         self._changed = self._led = False
         self._way: Recovery | None = None
-        self._cursors: list[_Cursor] = []
+        self._cursors: list[Cursor] = []
         self._passed: set[tuple[float, str]] = set()  # events at the very time where the clock stands
-        self._due: tuple[list[tuple[_Cursor, int]], set[tuple[float, str]]] | None = None  # found, not passed yet
+        self._due: tuple[list[tuple[Cursor, int]], set[tuple[float, str]]] | None = None  # found, not passed yet
         self.set_tasks(tasks, suspend_above, restart=True)
         self._changed = False
 
@@ -74,7 +75,7 @@ class Recovery:
         kept = {} if restart else {id(cursor.trajectory): cursor for cursor in self._cursors}
         trajectories = {id(task.trajectory): task.trajectory for task in tasks}
         cursors = [  # may fail, and nothing has changed then
-            kept.get(key) or _Cursor(trajectory, time, passed)
+            kept.get(key) or Cursor(trajectory, time, passed)
             for key, trajectory in trajectories.items()
             if hasattr(trajectory, "event")
         ]
@@ -275,29 +276,3 @@ class Recovery:
                 if not float(np.linalg.norm(error)) <= self.rules.tolerance:
                     names.append(task.name)
         return tuple(names)
-
-
-class _Cursor:
-    """Which event of a trajectory comes next; it only ever moves forward."""
-
-    def __init__(self, trajectory: Any, time: float, passed: set[tuple[float, str]]) -> None:
-        self.trajectory = trajectory
-        self.count = 0
-        count, events = self.due_until(time)  # what is past when the trajectory is taken up will not happen
-        for k, event in enumerate(events):
-            if not (event[0] < time or event in passed):
-                count = k
-                break
-        self.count = count
-
-    def due(self, time: float) -> bool:
-        event = self.trajectory.event(self.count)
-        return event is not None and event.time <= time
-
-    def due_until(self, time: float) -> tuple[int, list[tuple[float, str]]]:
-        """Number of the first event after `time`, and times and names of those before it that have not been passed."""
-        count, found = self.count, []
-        while (event := self.trajectory.event(count)) is not None and event.time <= time:
-            found.append((float(event.time), str(event.name)))
-            count += 1
-        return count, found

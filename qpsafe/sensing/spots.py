@@ -18,7 +18,7 @@ from qpsafe.sensing.spot_file import read_spots
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.state import RobotState
+    from qpsafe.robot.state import Jointed, RobotState
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ class SpotArray:
         if not ((self.field_of_view >= 0.0) & (self.field_of_view <= np.pi / 2)).all():
             raise ConfigurationError("SpotArray", "field_of_view", self.field_of_view, "0 to pi/2 rad")
 
-    def mounting(self, robot: Robot) -> tuple[NDArray[np.int64], Array]:
+    def mounting(self, robot: Jointed) -> tuple[NDArray[np.int64], Array]:
         """The body of each spot (k,), and in that body's frame its origin and direction, homogeneous columns (k, 4, 2).
 
         Bodies are numbered as in `RobotState.body_poses`.
@@ -139,10 +139,9 @@ class SpotArray:
         bodies = np.empty(len(self), dtype=np.int64)
         rays = np.zeros((len(self), 4, 2))
         for i, name in enumerate(self.frames):
-            frame = robot.model.frames[robot.frame_id(name)]
-            bodies[i] = frame.parentJoint
+            bodies[i], placement = robot.mounting(name)
             rays[i, :3, 0], rays[i, 3, 0], rays[i, :3, 1] = self.positions[i], 1.0, self.directions[i]
-            rays[i] = frame.placement.homogeneous @ rays[i]
+            rays[i] = placement @ rays[i]
         return bodies, rays
 
     def rays(self, state: RobotState) -> tuple[Array, Array]:
