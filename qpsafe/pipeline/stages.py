@@ -50,7 +50,7 @@ class Stages:
         return made
 
     def resolve_under(
-        self, barrier: DangerBarrier, measured: Array, seen: Seen, resolve: Resolve, given: tuple[Any, ...]
+        self, barrier: DangerBarrier, measured: Array, seen: Seen, resolve: Resolve, given: Any
     ) -> Resolved:
         """The same under a cap on the danger field: a soft level first, then scaled exactly.
 
@@ -61,9 +61,11 @@ class Stages:
             resolve: The half of the tick.
             given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits, as `resolve` takes them.
         """
-        state, qd = self._robot.at(measured), given[1]
+        state = self._robot.at(measured)
+        commanded, qd, qdd, samples, qd0, active, limits = given
         level = barrier.level(state, qd, seen.points, seen.danger)
-        resolved = resolve(*given, soft=(level,) if level else ())
+        soft = (level,) if level else ()
+        resolved = resolve(commanded, qd, qdd, samples, qd0, active, limits, soft)
         # exact, as far as the acceleration limits allow
         command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
         resolved.command = command if resolved.box is None else resolved.box.clip(command)
