@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from qpsafe.text.json_text import json_text
 
 ROOT = Path(__file__).resolve().parents[1]
-HELPER = ROOT / "qpsafe" / "json_text.py"
+HELPER = ROOT / "qpsafe" / "text" / "json_text.py"
 FOLDERS = ("qpsafe", "tasks", "sim", "robots", "examples", "benchmarks", "docs")
 
 numbers = st.none() | st.booleans() | st.integers() | st.floats() | st.text()

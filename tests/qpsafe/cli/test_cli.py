@@ -135,7 +135,7 @@ def test_compare_is_honest_in_its_exit_code() -> None:
 )
 def test_compare_states_its_sample(monkeypatch: pytest.MonkeyPatch, options: list[str], sample: tuple) -> None:
     from qpsafe.laws import equivalence
-    from qpsafe.sim.experiments.by_name.fixed import compare
+    from qpsafe.sim.experiments.fixed import compare
 
     asked = []
 

@@ -23,11 +23,6 @@ from qpsafe.cli import (
     calibrate,
     common,
     compare,
-    demo,
-    demo_fast,
-    demo_path,
-    demo_pick,
-    demo_robots,
     irc5_faults,
     place,
     robots,
@@ -35,6 +30,7 @@ from qpsafe.cli import (
     story,
     stream_report,
 )
+from qpsafe.cli.demos import all_robots, fast_person, fixed, path, pick_and_place
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot
 
@@ -97,7 +93,7 @@ def of_fixed(screen: Console, folder: Path) -> None:
         unusual=(1234, HOSTILE),
         left_out=(HOSTILE, "position error"),
     )
-    demo.show(report, "hierarchical law, strict projection", screen)
+    fixed.show(report, "hierarchical law, strict projection", screen)
 
 
 def of_fast(screen: Console, folder: Path) -> None:
@@ -107,7 +103,7 @@ def of_fast(screen: Console, folder: Path) -> None:
     touched = replace(never, contact=12.34, fastest_in_contact=1.2)
     names = {"fixed": never, "pick-and-place": touched}
     runs = [SimpleNamespace(experiment=name, speed=1.6, encounter=item) for name, item in names.items()]
-    demo_fast.show(runs, screen)  # type: ignore[arg-type]
+    fast_person.show(runs, screen)  # type: ignore[arg-type]
 
 
 def of_path(screen: Console, folder: Path) -> None:
@@ -117,7 +113,7 @@ def of_path(screen: Console, folder: Path) -> None:
     found = {name: PathFigures(*numbers) for name in ("strict", "paper", "nullspace", "strict, no recovery")}
     others = {name: found[name] for name in ("paper", "nullspace")}
     checks, _ = promises(found["strict"], found["strict, no recovery"], others)
-    demo_path.show(found, checks, ["an event that did not happen"], screen)
+    path.show(found, checks, ["an event that did not happen"], screen)
 
 
 def of_pick(screen: Console, folder: Path) -> None:
@@ -126,7 +122,7 @@ def of_pick(screen: Console, folder: Path) -> None:
     times = (12.34,) * 10
     numbers = (True, 10, 1, 2, 13, 14, 1234.5, times, 0.123, 0.234, 12345, 12346, 0.0123, 12, 123.4, 1234.5, 12345)
     alone, *runs = (PickFigures(seed, *numbers) for seed in (0, 17, 18))
-    demo_pick.show(runs, alone, promises(runs, alone, 10), screen)
+    pick_and_place.show(runs, alone, promises(runs, alone, 10), screen)
 
 
 def of_robots(screen: Console, folder: Path) -> None:
@@ -134,7 +130,7 @@ def of_robots(screen: Console, folder: Path) -> None:
 
     gained = (0.1234, -0.0123, 0.1)
     rows = [RobotRow(name, 14, 12, (3, 3), 1234.5, name != "ok", gained, "", name == "ok") for name in ("ok", HOSTILE)]
-    demo_robots.show_robots(rows, screen)
+    all_robots.show_robots(rows, screen)
 
 
 def of_faults(screen: Console, folder: Path) -> None:
@@ -226,11 +222,11 @@ TABLES: dict[Callable[..., None], Show] = {
     calibrate._show: of_calibration,
     common.show_checks: of_checks,
     compare._show: of_compare,
-    demo.show: of_fixed,
-    demo_fast.show: of_fast,
-    demo_path.show: of_path,
-    demo_pick.show: of_pick,
-    demo_robots.show_robots: of_robots,
+    fixed.show: of_fixed,
+    fast_person.show: of_fast,
+    path.show: of_path,
+    pick_and_place.show: of_pick,
+    all_robots.show_robots: of_robots,
     irc5_faults.show: of_faults,
     place.show: of_place,
     robots.inspect: of_inspect,
@@ -242,7 +238,7 @@ TABLES: dict[Callable[..., None], Show] = {
 
 def test_no_table_is_forgotten_and_none_is_made_otherwise() -> None:
     made = set()
-    for file in Path(qpsafe.cli.__file__).parent.glob("*.py"):
+    for file in Path(qpsafe.cli.__file__).parent.rglob("*.py"):
         text = file.read_text(encoding="utf-8")
         assert file.name == "sheet.py" or "rich.table import Table" not in text
         assert file.name == "common.py" or not re.search(r"[^.\w]Console\(|\becho\(.*style|secho\(", text)
