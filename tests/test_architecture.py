@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import subprocess
 import sys
@@ -112,3 +113,16 @@ def test_no_room_is_crowded_and_no_module_is_long() -> None:
         str(path.relative_to(ROOT)): len(path.read_text("utf-8").splitlines()) for p in rooms().values() for path in p
     }
     assert {name: length for name, length in lengths.items() if length > 300} == {}
+
+
+def test_no_function_takes_many_positional_arguments() -> None:
+    """But compiled kernels, which cannot take them otherwise, and commands, whose options the command line names."""
+    many = []
+    for path in (path for inside in rooms().values() for path in inside if "cli" not in path.parts):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                kernel = any(ast.unparse(d).startswith(("entry", "inline")) for d in node.decorator_list)
+                names = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg not in ("self", "cls")]
+                if len(names) > 8 and not kernel:
+                    many.append(f"{path.relative_to(ROOT)}: {node.name}")
+    assert many == ["qpsafe/hqp/own/hierarchy.py: run"]  # compiled in `qpsafe.hqp.own.solver`

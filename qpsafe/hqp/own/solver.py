@@ -64,6 +64,7 @@ def solve_packed(
     box_low: Array,
     box_high: Array,
     hard: bool,
+    *,
     damping: Array | None = None,
 ) -> tuple[Array, Index]:
     """Solve levels of `counts` rows each, packed one below the other.
