@@ -31,18 +31,11 @@ Array = NDArray[np.float64]
 # 1/0 = inf as in C; no fastmath, NaN must come through. Without reference counting (`_nrt`), whose atomic counters cost
 # more than the arithmetic here: compiled code may not allocate.
 OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-_entry: dict[str, Any] = {}
-_inner: dict[str, Any] = {}
-# by numba's own pipeline where it is not known yet: to the same results, but it takes half as long again
-if numba.version_info.short <= (0, 68):
-    from qpsafe.compiled.compilers import EntryCompiler, InnerCompiler
-
-    _entry, _inner = {"pipeline_class": EntryCompiler}, {"pipeline_class": InnerCompiler}
-inline = numba.njit(no_cpython_wrapper=True, **_inner, **OPTIONS)
+inline = numba.njit(no_cpython_wrapper=True, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
 PATIENCE = 1.5  # seconds of compiling that pass without a word: one changed kernel takes less
-NOTICE = "qpsafe: compiling for this machine, once, takes about 15 s ..."
+NOTICE = "qpsafe: compiling for this machine, once, takes about half a minute ..."
 
 
 class _Watch(event.Listener):
@@ -104,12 +97,11 @@ def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Call
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         kernel = f"{function.__module__}.{function.__name__}"
         function.__qualname__ += f"_{checksum(sys.modules[__name__], memory, *uses):08x}"
-        options = {**_entry, **OPTIONS}
         with _watch.over(kernel):
             try:
-                return numba.njit(types_, cache=True, **options)(function)
+                return numba.njit(types_, cache=True, **OPTIONS)(function)
             except RuntimeError:  # no directory that numba may write to
-                return numba.njit(types_, **options)(function)
+                return numba.njit(types_, **OPTIONS)(function)
 
     return compiled
 

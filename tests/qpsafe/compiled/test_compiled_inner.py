@@ -1,4 +1,4 @@
-"""Inner functions take a short way through numba: the same results as by numba's own, and nobody else notices."""
+"""What compiled code shares: views, references, and kernels that are found wherever packages lie."""
 
 from __future__ import annotations
 
@@ -6,48 +6,13 @@ import importlib
 from pathlib import Path
 from typing import NamedTuple
 
-import numba
 import numpy as np
-import pytest
 from numba import types
 
 from qpsafe.bench.compilation import PACKAGES, modules
 from qpsafe.compiled.by_reference import by_reference
-from qpsafe.compiled.compiled import OPTIONS, entry, inline, seconds
+from qpsafe.compiled.compiled import entry, inline, seconds
 from qpsafe.compiled.memory import view
-
-
-def mixed(a: np.ndarray, b: np.ndarray, k: int) -> float:
-    """Loops, negative indices, slices, integers among floats, min and max, NaN on the way."""
-    total, count = 0.0, 0
-    for i in range(a.shape[0]):
-        part = b[i, 1:]
-        total += min(max(a[-1 - i] / part[k], -3.0), 7.0) + abs(part[-1]) ** 2
-        count += 1 if a[i] > part[0] else -i
-    return total * count if total == total else float(count)
-
-
-own_inner = inline(mixed)
-numba_inner = numba.njit(error_model="numpy")(mixed)
-_arrays = types.float64[::1], types.float64[:, ::1]
-
-
-@entry(types.float64(*_arrays, types.int64))
-def by_own(a: np.ndarray, b: np.ndarray, k: int) -> float:
-    return own_inner(a, b, k) + own_inner(b[0], b, k)
-
-
-@numba.njit(types.float64(*_arrays, types.int64))
-def by_numba(a: np.ndarray, b: np.ndarray, k: int) -> float:
-    return numba_inner(a, b, k) + numba_inner(b[0], b, k)
-
-
-def test_the_bits_are_those_of_numba() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        a, b = rng.normal(size=5), rng.normal(size=(5, 5)) * rng.choice([0.0, 1.0, 1e3], (5, 5))
-        a[rng.random(5) < 0.05] = np.nan
-        assert np.array(by_own(a, b, 1)).tobytes() == np.array(by_numba(a, b, 1)).tobytes()
 
 
 def cut(block: np.ndarray, rows: int) -> float:
@@ -108,26 +73,3 @@ def test_every_kernel_is_timed() -> None:
         importlib.import_module(name)
     own = {kernel.rsplit(".", 1)[0] for kernel in seconds if kernel.startswith("qpsafe.")}
     assert own - {"qpsafe.hqp.own.hierarchy"} == set(found) - {"qpsafe.hqp.own.solver"}
-
-
-def test_operators_of_other_types_are_found_afterwards() -> None:
-    @numba.njit
-    def others(text: str, pairs: tuple, table: np.ndarray) -> tuple:
-        numbers = [3, 4, 5]
-        known = {"a": 1.5}
-        return text[1], pairs[1], numbers[-1], known["a"], (table[1] + table)[0]
-
-    assert others("abc", (1, "x"), np.arange(3.0)) == ("b", "x", 5, 1.5, 1.0)
-
-
-def test_a_mistake_is_told_as_numba_tells_it() -> None:
-    @inline
-    def wrong(a):  # type: ignore[no-untyped-def]
-        return a["x"]
-
-    @numba.njit(**OPTIONS)
-    def caller(a):  # type: ignore[no-untyped-def]
-        return wrong(a)
-
-    with pytest.raises(numba.TypingError, match="getitem"):
-        caller(np.zeros(3))
