@@ -91,6 +91,17 @@ def test_nothing_puts_links_into_the_source_tree() -> None:
     assert not [path for path in (ROOT / "qpsafe").iterdir() if path.is_symlink()], "left over from an older Makefile"
 
 
+def test_the_oldest_numba_that_is_allowed_is_tried_and_the_newest_is_bounded() -> None:
+    """Its inner parts, of which compiled code uses a few, change from one minor version to the next."""
+    (numba,) = (requirement for requirement in requirements() if requirement.name == "numba")
+    bounds = {specifier.operator: specifier.version for specifier in numba.specifier}
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    assert f'"numba=={bounds[">="]}.*"' in workflow
+    pinned = re.search(r"^numba==(\d+)\.(\d+)", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    assert pinned is not None
+    assert bounds["<"] == f"{pinned[1]}.{int(pinned[2]) + 1}"
+
+
 def requirements(*extras: str) -> list[Requirement]:
     """Dependencies of the project with some extras, extras that name extras resolved."""
     found = [Requirement(text) for text in PROJECT["dependencies"]]

@@ -134,7 +134,9 @@ class Recovery:
         """
         self._next_phase(cdf_n, state, activations)
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
-            return tuple([task.trajectory.sample(self.path_time) for task in self.tasks])
+            samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
+            # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
+            return tuple([sample.slowed(0.0) for sample in samples] if self.waits_for else samples)
         if self.phase == SUSPENDED:
             held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
             self._last = [(state, sample) for sample in held]  # only the last tick's will be of interest

@@ -1,12 +1,13 @@
 """Suspension and recovery, section IV-C, with a robot that follows its reference perfectly."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.recovery.recovery import FOLLOWING, RECOVERING, SUSPENDED, Recovery, RecoveryRules, minimum_jerk, run_out
 from qpsafe.tasks.joint import PostureTask
@@ -355,3 +356,30 @@ def test_minimum_jerk_goes_from_rest_to_rest_and_its_derivative_is_right() -> No
         assert run_out(tau)[1] == pytest.approx(difference, abs=1e-8)
     assert (run_out(0.0), run_out(1.0)) == ((0.0, 1.0), (0.0, 0.0))
     assert max(minimum_jerk(t)[1] for t in np.linspace(0, 1, 1001)) == pytest.approx(15.0 / 8.0)
+
+
+class Passing:
+    """A line along x at a constant speed, with an event in the middle of the motion, twice."""
+
+    def __init__(self, pose: np.ndarray, speed: float) -> None:
+        self.pose, self.speed = pose, speed
+
+    def sample(self, t: float) -> Sample:
+        pose = self.pose.copy()
+        pose[0, 3] += self.speed * t
+        return Sample(pose, np.array([self.speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+
+    def event(self, k: int) -> Event | None:
+        return Event(0.4 * (k + 1), str(k)) if k < 2 else None
+
+
+@pytest.mark.parametrize("speed", [-0.03, 0.01])
+def test_events_in_the_middle_of_a_motion_are_reached(irb140: Any, run: Any, speed: float) -> None:
+    """While the clock stands for an event, its reference stands too: else the robot would lead it for ever."""
+    path = Passing(irb140.pose("tcp", irb140.home), speed)
+    loop = run(tasks=[qpsafe.PositionTask("tcp", path, 5.0), qpsafe.OrientationTask("tcp", path)])
+    events: list[str] = []
+    for _ in range(1500):
+        events += loop.step().events
+    assert events == ["0", "1"]
+    assert loop.controller.recovery.path_time > 2.0
