@@ -53,7 +53,13 @@ class Box(NamedTuple):
         return admitted, _admit(qd, self.lower, self.upper, self.sacrificed, admitted)
 
     def binding(self, qd: NDArray[np.float64], names: tuple[str, ...], tolerance: float = 1e-9) -> tuple[str, ...]:
-        """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``."""
+        """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``.
+
+        Args:
+            qd: (n,) [rad/s].
+            names: Of the joints.
+            tolerance: What counts as touching [rad/s].
+        """
         found = []
         for i, name in enumerate(names):
             if qd[i] >= self.upper[i] - tolerance:
@@ -156,6 +162,12 @@ class JointLimits(Fixed):
 
 def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, dt: float) -> JointLimits | None:
     """`limits`, if they fit the robot and the tick; the robot's own for None or "robot"; None for "off".
+
+    Args:
+        where: Who asks, for the error.
+        limits: As given.
+        robot: Whose joints these are.
+        dt: Tick [s].
 
     Raises:
         ConfigurationError: They do not, in the name of `where`.

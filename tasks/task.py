@@ -150,5 +150,11 @@ class PoseTask(Task):
 
 
 def errors_of(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
-    """Errors (rows,) of tasks against their own trajectories at a time on the path [s]; the caller's own arrays."""
+    """Errors (rows,) of tasks against their own trajectories at a time on the path [s]; the caller's own arrays.
+
+    Args:
+        tasks: Highest priority first.
+        state: Where the robot is.
+        time: On the path [s].
+    """
     return tuple([np.array(task.error(task.value(state), task.trajectory.sample(time))) for task in tasks])

@@ -130,7 +130,14 @@ class FixedJoints(Fixed):
 
 
 def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = None) -> NDArray[np.float64]:
-    """`vector` as a read-only (n,) array of finite numbers, or a ConfigurationError that says what is wrong."""
+    """`vector` as a read-only (n,) array of finite numbers, or a ConfigurationError that says what is wrong.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        vector: As given.
+        size: n; any if None.
+    """
     expected = f"{'some' if size is None else size} finite numbers"
     try:
         array = np.array(vector, dtype=float)
@@ -143,7 +150,13 @@ def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = N
 
 
 def checked_pose(where: str, key: str, pose: ArrayLike) -> NDArray[np.float64]:
-    """`pose` as a read-only (4, 4) array, or a ConfigurationError that says what is wrong."""
+    """`pose` as a read-only (4, 4) array, or a ConfigurationError that says what is wrong.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        pose: As given.
+    """
     expected = "a homogeneous matrix (4, 4) with a proper rotation and last row 0 0 0 1"
     try:
         matrix = np.array(pose, dtype=float)

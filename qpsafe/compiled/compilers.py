@@ -93,7 +93,13 @@ class _InnerLowering(typed_passes.NativeLowering):
 
 
 class EntryCompiler(Compiler):
-    """numba's compiler, with 2. to 4."""
+    """numba's compiler, with 2. to 4.
+
+    Args:
+        typing_context: numba's.
+        target_context: numba's.
+        others: What else numba gives.
+    """
 
     def __init__(self, typing_context: Any, target_context: Any, *others: Any) -> None:
         super().__init__(typing_context, target_context, *others)

@@ -96,9 +96,21 @@ class DangerField:
         return value, gradient
 
     def value(self, points: ArrayLike, wire: Wire, point_velocities: ArrayLike | None = None) -> NDArray[np.float64]:
-        """CDF (p,), eq. (5); arguments as for `evaluate`."""
+        """CDF (p,), eq. (5); arguments as for `evaluate`.
+
+        Args:
+            points: Detected points p, (p, 3) [m].
+            wire: The robot's segments and their velocities.
+            point_velocities: As for `evaluate`; at rest by default.
+        """
         return self.evaluate(points, wire, point_velocities)[0]
 
     def vectors(self, points: ArrayLike, wire: Wire, point_velocities: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Vector field (p, 3), eq. (6), zero where the gradient is; arguments as for `evaluate`."""
+        """Vector field (p, 3), eq. (6), zero where the gradient is; arguments as for `evaluate`.
+
+        Args:
+            points: Detected points p, (p, 3) [m].
+            wire: The robot's segments and their velocities.
+            point_velocities: As for `evaluate`; at rest by default.
+        """
         return danger_vectors(*self.evaluate(points, wire, point_velocities))

@@ -106,7 +106,13 @@ class DangerBarrier(Fixed):
         return result
 
     def kinetic_gradient(self, state: RobotState, qd: Array, points: Array) -> Array:
-        """∂(k2 H)/∂q̇ at p points, (p, n): Σ over links ∂(k2 H)/∂v_i J_i of both ends; 0 at rest, where H has a kink."""
+        """∂(k2 H)/∂q̇ at p points, (p, n): Σ over links ∂(k2 H)/∂v_i J_i of both ends; 0 at rest, where H has a kink.
+
+        Args:
+            state: Where the robot is.
+            qd: Its joint velocity (n,) [rad/s].
+            points: (p, 3) [m].
+        """
         if np.abs(qd).max() < _REST:
             return np.zeros((len(points), len(qd)))
         wire, (starts, stops), J = state.wire(qd), state.robot.wire_indices, state.wire_jacobians()

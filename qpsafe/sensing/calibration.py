@@ -86,6 +86,11 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
     wrong are left out of a second fit: they do not spoil the curve. Voltages are weighted by the slope of the curve, so
     that errors in distance count, not in voltage.
 
+    Args:
+        spot: Its name, for errors.
+        distances: (pairs,) [m].
+        voltages: (pairs,) [V].
+
     Raises:
         ConfigurationError: Too few pairs, numbers that are not finite, or pairs that are no falling curve.
     """

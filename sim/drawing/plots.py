@@ -56,7 +56,13 @@ def figure_11(log: RunLog, path: Path, title: str = "", activation: Activation |
 
 
 def distance_figure(log: RunLog, without: NDArray[np.float64], path: Path) -> None:
-    """True smallest distance robot-board with the controller and with the robot keeping its pose."""
+    """True smallest distance robot-board with the controller and with the robot keeping its pose.
+
+    Args:
+        log: Of the run.
+        without: That distance of a robot that keeps its pose, (ticks,) [m].
+        path: The file to write.
+    """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

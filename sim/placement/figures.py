@@ -27,7 +27,13 @@ SOURCE = (20, 0.89)
 
 
 def figure_9(result: Study, path: Path, title: str) -> None:
-    """Detection probability, cost and danger measured over the number of spots; written whole or not at all."""
+    """Detection probability, cost and danger measured over the number of spots; written whole or not at all.
+
+    Args:
+        result: The study.
+        path: The file to write.
+        title: Of the figure.
+    """
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -134,7 +134,14 @@ _CSV = (
 
 
 def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: float = 0.0) -> list[Interval]:
-    """Stretches of equal names; those shorter than `shortest` [s] are merged into the one before them."""
+    """Stretches of equal names; those shorter than `shortest` [s] are merged into the one before them.
+
+    Args:
+        time: Of every tick (ticks,) [s].
+        names: Of every tick (ticks,).
+        dt: Tick [s].
+        shortest: [s].
+    """
     found: list[Interval] = []
     for t, name in zip(time, names, strict=True):
         if found and found[-1].name == name:

@@ -159,7 +159,13 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
 
 
 def show(report: Report, title: str, screen: Console) -> None:
-    """Print the report as tables."""
+    """Print the report as tables.
+
+    Args:
+        report: What was measured.
+        title: Of the first table.
+        screen: Where to.
+    """
     from rich.text import Text
 
     from qpsafe.cli.sheet import Sheet

@@ -115,7 +115,14 @@ def path(
 
 
 def show(found: dict[str, PathFigures], checks: list[Check], left_out: list[str], screen: Console) -> None:
-    """Print figures and promises as tables."""
+    """Print figures and promises as tables.
+
+    Args:
+        found: Figures of each law, by its name.
+        checks: What was promised and measured.
+        left_out: Promises that do not apply to this run, in words.
+        screen: Where to.
+    """
     from qpsafe.cli.sheet import Sheet
 
     def shown(value: float | None, form: str, size: float = 1.0) -> str:

@@ -145,7 +145,13 @@ def promises(
 
 
 def to_dict(found: Mapping[str, PathFigures], checks: list[Check], left_out: Sequence[str]) -> dict[str, Any]:
-    """For JSON."""
+    """For JSON.
+
+    Args:
+        found: Figures of each law, by its name.
+        checks: What was promised and measured.
+        left_out: Promises that do not apply to this run, in words.
+    """
     return {
         "laws": {name: plain(asdict(item)) for name, item in found.items()},
         "checks": [check._asdict() for check in checks],

@@ -136,7 +136,14 @@ def draw(experiment: PickPlaceExperiment, run: PickRun, path: Path) -> list[Mome
 
 
 def picture(experiment: PickPlaceExperiment, run: PickRun, tick: int, camera: Camera) -> Any:
-    """The scene as it was at a tick (within `STATES` ticks), (height, width, 3) RGB."""
+    """The scene as it was at a tick (within `STATES` ticks), (height, width, 3) RGB.
+
+    Args:
+        experiment: What was run.
+        run: Its log and states.
+        tick: Which.
+        camera: What it is seen by.
+    """
     state = min(tick // STATES, len(run.states) - 1)
     data = experiment.scene.make_data()
     data.qpos[:] = run.states[state]
