@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,6 +45,7 @@ class RunLog:
         solve_time: Wall time of `step` (N,) [s]; the only part that differs between equal runs.
         messages: (tick, message) of everything unusual.
         spot_names: (k,).
+        metrics: What the user measured, (N,) or (N, k) by name; see `Control.metrics`.
     """
 
     dt: float
@@ -70,6 +71,7 @@ class RunLog:
     solve_time: Array
     messages: tuple[tuple[int, str], ...]
     spot_names: tuple[str, ...]
+    metrics: Mapping[str, Array] = field(default_factory=dict)
 
     def intervals(self, shortest: float = 0.0) -> list[Interval]:
         """Regimes in the order they were entered; those shorter than `shortest` [s] are merged into the one before."""
@@ -107,6 +109,8 @@ class RunLog:
 
         for name, unit in _CSV:
             add(name, getattr(self, name), unit)
+        for name, values in self.metrics.items():
+            add(name, values.reshape(len(values), -1) if values.ndim > 1 else values)
         return names, columns
 
 
@@ -158,7 +162,7 @@ def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: 
 
 
 #: Fields of `RunLog` in the order of a recorded row.
-_RECORDED = tuple(f.name for f in fields(RunLog) if f.name not in ("dt", "messages", "spot_names"))
+_RECORDED = tuple(f.name for f in fields(RunLog) if f.name not in ("dt", "messages", "spot_names", "metrics"))
 
 
 class Recorder:
@@ -169,6 +173,7 @@ class Recorder:
         self.spot_names = spot_names
         self._rows: list[tuple] = []
         self._messages: list[tuple[int, str]] = []
+        self._metrics: dict[str, list[Array]] = {}
 
     def add(
         self,
@@ -179,21 +184,30 @@ class Recorder:
         measured: tuple[Array, Array],
         euler: Array,
         gaps: tuple[float, float],
+        errors: tuple[Array, Array] | None = None,
+        metrics: Mapping[str, Array] | None = None,
     ) -> None:
         """Record one tick.
 
         Args:
-            tick: From the controller; a position task for each tool, then an orientation task for each.
+            tick: From the controller.
             q, qd: Measured joints (n,).
             distances: Readings of the spots (k,).
             measured: Position (3 tools,) and orientation error (3 tools,) of the measured pose.
             euler: Euler-angle error of the commanded pose (3 tools,).
             gaps: Smallest true distances robot-board, robot-person [m].
+            errors: Position (3 tools,) and orientation error (3 tools,) of the commanded pose; by default the tick's,
+                whose tasks are then a position for each tool and an orientation for each.
+            metrics: Of this tick, by name; the same names at every tick.
         """
         self._messages.extend((len(self._rows), message) for message in tick.messages)
-        tools = len(tick.activations) // 2
-        errors = tick.errors or (np.full(3, np.nan),) * 2 * tools
-        position, orientation = np.concatenate(errors[:tools]), np.concatenate(errors[tools:])
+        if errors is None:
+            tools = len(tick.activations) // 2
+            own = tick.errors or (np.full(3, np.nan),) * 2 * tools
+            errors = np.concatenate(own[:tools]), np.concatenate(own[tools:])
+        position, orientation = errors
+        for name, value in (metrics or {}).items():
+            self._metrics.setdefault(name, []).append(value)
         self._rows.append(
             (
                 tick.reference.time,
@@ -222,4 +236,5 @@ class Recorder:
         """The run so far as arrays."""
         columns = (np.array(column) for column in zip(*self._rows, strict=True))
         arrays: dict[str, Any] = dict(zip(_RECORDED, columns, strict=True))
-        return RunLog(dt=self.dt, messages=tuple(self._messages), spot_names=self.spot_names, **arrays)
+        metrics = {name: np.array(values) for name, values in self._metrics.items()}
+        return RunLog(dt=self.dt, messages=tuple(self._messages), spot_names=self.spot_names, metrics=metrics, **arrays)

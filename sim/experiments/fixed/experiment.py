@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.robot.state import RobotState
 from qpsafe.sim.experiments.fixed.loop import FixedLoop
 from qpsafe.sim.experiments.fixed.settings import FixedSettings
+from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tasks.rotation import euler_zyx, log3
 from qpsafe.tick import Tick
-
-if TYPE_CHECKING:
-    pass
 
 Observer = Callable[[Tick, Scene, Plant], None]
 
@@ -54,6 +52,8 @@ class FixedExperiment(FixedSettings):
                 (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
                 np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
+                own_errors(self, commanded, goals),
+                self.measured(tick, scene, plant),
             )
             if observer is not None:
                 observer(tick, scene, plant)
@@ -69,6 +69,22 @@ class FixedExperiment(FixedSettings):
             scene.place_people(data, walk.poses(k * dt))
             result[k] = board_distance(scene, data).distance
         return result
+
+
+def own_errors(
+    settings: Control, commanded: RobotState, goals: Mapping[str, NDArray[np.float64]]
+) -> tuple[NDArray, NDArray] | None:
+    """Position and orientation errors of all tools where tasks are the user's and say something else; else None.
+
+    Args:
+        settings: Of the experiment.
+        commanded: Where the robot is to be.
+        goals: Where each tool should be, (4, 4).
+    """
+    if settings.tasks is None:
+        return None
+    errors = [pose_error(commanded.pose(name), goal) for name, goal in goals.items()]
+    return np.concatenate([error[0] for error in errors]), np.concatenate([error[1] for error in errors])
 
 
 def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
