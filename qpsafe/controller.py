@@ -95,7 +95,7 @@ class SafetyController(Parts):
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
         self._dt = checked_dt("SafetyController", dt)
-        check_tasks(robot, tasks, self._dt)
+        self._labels = check_tasks(robot, tasks, self._dt)
         self._tasks = tuple(tasks)
         self._law = HierarchicalLaw() if law is None else checked_law(law)
         self._field = DangerField() if field is None else checked_field(field)
@@ -126,8 +126,7 @@ class SafetyController(Parts):
         self._units.reset()
         rules = self._recovery_rules
         self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)
-        self._seq = -1
-        self._active = False
+        self._seq, self._active = -1, False
         self._q = self._robot.home
         self._qd = self._qd_before = np.zeros(self._robot.nq)
 
@@ -258,6 +257,7 @@ class SafetyController(Parts):
             events=recovery.due_events(),
             waits_for=recovery.waits_for,
             joint_names=self._robot.joint_names,
+            task_names=self._labels,
             resolved=resolved,
             off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -42,6 +43,9 @@ class Box(NamedTuple):
     lower_kind: NDArray[np.int64]
     upper_kind: NDArray[np.int64]
     sacrificed: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        return call(self, self.lower, self.upper)
 
     def clip(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
         """The nearest velocity inside the box; `qd` must be finite."""
@@ -70,8 +74,6 @@ class Box(NamedTuple):
 
     def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """What was sacrificed, in words, one entry per joint concerned."""
-        if not self.sacrificed.any():
-            return ()
         return tuple(f"{names[i]}: {KINDS[kind]} limit sacrificed" for i, kind in enumerate(self.sacrificed) if kind)
 
 
@@ -124,6 +126,9 @@ class JointLimits(Fixed):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
 
         self.table = np.array((self.lower, self.upper, self.max_velocity, self.max_acceleration))  # for compiled code
+
+    def __repr__(self) -> str:
+        return call(self, max_velocity=self.max_velocity, max_acceleration=self.max_acceleration, dt=self.dt)
 
     @classmethod
     def of(cls, robot: Robot, dt: float = 0.004) -> JointLimits:

@@ -12,6 +12,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.rotation import log3
 from qpsafe.tasks.task import Misfit, PoseTask
 from qpsafe.tasks.trajectory import Sample, Trajectory
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -43,6 +44,9 @@ class FrameTask(PoseTask):
             raise ConfigurationError(type(self).__name__, "rows", rows, "some of 0 to 5, in increasing order")
         self.rows = tuple(int(row) for row in rows)
         super().__init__(frame, trajectory, gain)
+
+    def __repr__(self) -> str:
+        return call(self, *self.frames, self.trajectory, gain=self.gain, rows=self.rows)
 
     def error(self, value: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """Rows of (x_d - x, log(R_d Rᵀ)), (rows,) [m, rad]."""

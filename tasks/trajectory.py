@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, exp3_jacobian, is_rotation, log3
+from qpsafe.text.words import call
 
 
 class Sample(NamedTuple):
@@ -23,6 +24,9 @@ class Sample(NamedTuple):
 
     pose: NDArray[np.float64]
     twist: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return call(self, position=self.pose[:3, 3], rotation=log3(self.pose[:3, :3]), twist=self.twist)
 
     @property
     def finite(self) -> bool:
@@ -60,6 +64,9 @@ class JointSample(NamedTuple):
 
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return call(self, self.position, velocity=self.velocity)
 
     @property
     def finite(self) -> bool:
@@ -104,6 +111,9 @@ class FixedPose(Fixed):
         self._sample = Sample(self.pose, np.zeros(6))
         self._sample.twist.flags.writeable = False
 
+    def __repr__(self) -> str:
+        return call(self, position=self.pose[:3, 3], rotation=log3(self.pose[:3, :3]))
+
     def sample(self, t: float) -> Sample:
         """The same pose at every time, at rest."""
         return self._sample
@@ -123,6 +133,9 @@ class FixedJoints(Fixed):
 
     def __init__(self, position: ArrayLike) -> None:
         self.position = checked_vector("FixedJoints", "position", position)
+
+    def __repr__(self) -> str:
+        return call(self, self.position)
 
     def sample(self, t: float) -> JointSample:
         """The same positions at every time, at rest."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.words import call
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,9 @@ class Activation(Fixed):
                     lower,
                     f"Δ(1+ε) <= {upper.start:g}, where the release of the task above it begins (found {lower.end:g})",
                 )
+
+    def __repr__(self) -> str:
+        return call(self, self.thresholds)
 
     @property
     def suspend_above(self) -> float:

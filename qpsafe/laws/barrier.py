@@ -19,6 +19,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,9 @@ class DangerBarrier(Fixed):
             raise ConfigurationError("DangerBarrier", "points", points, "at least 1")
         self.delta_max, self.horizon, self.points = float(delta_max), float(horizon), int(points)
         self.field = DangerField() if field is None else field
+
+    def __repr__(self) -> str:
+        return call(self, self.delta_max, horizon=self.horizon, points=self.points)
 
     def level(self, state: RobotState, qd: Array, points: Array, danger: Array) -> Level | None:
         """The soft level  k1 (S + τ ∂S/∂q q̇) + k2 ∂H/∂q̇ q̇ <= Δ_max  for the most dangerous points.

@@ -21,6 +21,7 @@ from qpsafe.hqp.solve import STATUS, note_of, solve_hierarchy
 from qpsafe.laws.damping import DAMPING_TIME, threshold
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
+from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
 
@@ -80,6 +81,10 @@ class HierarchicalLaw(Fixed):
         if own:
             import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
         self.damping, self.damping_time = float(damping), float(damping_time)
+
+    def __repr__(self) -> str:
+        given = {"solver": self.solver} if self.solver is not None else {}
+        return call(self, self.projection, **given, damping=self.damping, damping_time=self.damping_time)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""

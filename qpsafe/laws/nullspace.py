@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
 from qpsafe.laws.problem import LawProblem, LawResult
+from qpsafe.text.words import call
 
 #: Singular values below this fraction of the largest count as zero, here and in the QP solvers.
 RANK_TOLERANCE = 1e-10
@@ -72,6 +73,9 @@ class NullspaceLaw:
 
     It takes no notice of limits; the controller clips what it returns.
     """
+
+    def __repr__(self) -> str:
+        return call(self)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Evaluate the law for one tick; see `LawProblem` for shapes."""

@@ -67,8 +67,8 @@ def checked_dt(where: str, dt: float) -> float:
     return float(dt)
 
 
-def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
-    """Refuse tasks that the robot cannot do.
+def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> tuple[str, ...]:
+    """What reports call the tasks; those that the robot cannot do are refused.
 
     Args:
         robot: Who has to do them.
@@ -86,6 +86,7 @@ def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
         if not task.gain * dt < 1.0:
             expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
             raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)
+    return tuple(task.label for task in tasks)
 
 
 def checked_robot(where: str, robot: Robot) -> Robot:

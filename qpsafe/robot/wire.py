@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.text.words import counted
+
 
 class Wire(NamedTuple):
     """Segments of a robot with the velocities of their ends, world frame.
@@ -25,3 +27,8 @@ class Wire(NamedTuple):
     ends: NDArray[np.float64]
     start_velocities: NDArray[np.float64]
     end_velocities: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        ends = np.concatenate((self.start_velocities, self.end_velocities))
+        fastest = float(np.linalg.norm(ends, axis=1).max(initial=0.0))
+        return f"Wire({counted(len(self.starts), 'link')}, fastest end at {fastest:.4g} m/s)"

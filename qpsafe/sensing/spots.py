@@ -15,6 +15,7 @@ from qpsafe.compiled.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.spot import Spot
 from qpsafe.sensing.spot_file import read_spots
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -57,6 +58,11 @@ class SpotArray:
             own = np.array(getattr(self, key))
             own.flags.writeable = False
             object.__setattr__(self, key, own)
+
+    def __repr__(self) -> str:
+        range_max = float(self.range_max.max(initial=0.0))
+        size = f"{counted(len(self), 'spot')} on {counted(len(set(self.links.tolist())), 'link')}"
+        return f"SpotArray({size}, range_max={range_max:.4g})"
 
     def __len__(self) -> int:
         return len(self.names)

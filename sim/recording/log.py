@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.text.words import counted
 from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]
@@ -72,6 +73,11 @@ class RunLog:
     messages: tuple[tuple[int, str], ...]
     spot_names: tuple[str, ...]
     metrics: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        regimes = {name: int((self.regime == name).sum()) for name in dict.fromkeys(self.regime.tolist())}
+        rows, odd = counted(len(self.time), "tick"), int((self.status != "ok").sum())
+        return f"RunLog({rows}, dt={self.dt:.4g}, {regimes}, cdf_n<={self.cdf_n.max():.4g}, {odd} not ok)"
 
     def intervals(self, shortest: float = 0.0) -> list[Interval]:
         """Regimes in the order they were entered; those shorter than `shortest` [s] are merged into the one before."""
