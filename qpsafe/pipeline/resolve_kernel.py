@@ -89,14 +89,16 @@ def sizes_of(n: int, rows: int, kinds: int) -> tuple[int, int]:
 
 
 def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
-    """Cut from a block what changes every tick: gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals
-    (tasks, 4, 4); twists (tasks, 6); weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in
+    """Cut from a block what changes every tick.
+
+    These are gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals (tasks, 4, 4); twists (tasks, 6);
+    weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in by the call; q̇0 (n,).
 
     Args:
         block: The floats.
         n: Joints.
         tasks: How many.
-    by the call; q̇0 (n,)."""
+    """
     return (
         view(block, 0, (tasks,)),
         view(block, tasks, (tasks,)),
