@@ -60,15 +60,15 @@ class SafetyController(Parts):
         tasks: What it is asked to do, highest priority first.
         law: How tasks and evasion are combined; `HierarchicalLaw()` by default.
         dt: Tick [s]; the IRC5 wants 0.004.
-        field: The danger field; the source's weights by default.
-        activation: Thresholds of the tasks; the robot's for one or two tasks (the source's on the IRB 140).
+        field: The danger field; the paper's weights by default.
+        activation: Thresholds of the tasks; the robot's for one or two tasks (the paper's on the IRB 140).
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; "off" switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
-        barrier: A cap on the danger field, beyond the source; none by default.
+        barrier: A cap on the danger field, beyond the paper; none by default.
         recovery: How the robot returns to its path after danger.
 
     Raises:

@@ -22,7 +22,7 @@ ALL = (0, 1, 2, 3, 4, 5)
 
 
 class FrameTask(PoseTask):
-    """Keep the pose of a frame, or some rows of it, on a trajectory: the source picks rows of J_ee in the same way.
+    """Keep the pose of a frame, or some rows of it, on a trajectory: the paper picks rows of J_ee in the same way.
 
     e = (x_d - x, log(R_d Rᵀ)) in world axes [m, rad]. A single angular row says what it seems to say only while the
     other angles are small.

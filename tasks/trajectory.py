@@ -95,7 +95,7 @@ class Trajectory(Protocol):
 
 
 class FixedPose(Fixed):
-    """A reference that does not move, as in the source's first experiment.
+    """A reference that does not move, as in the paper's first experiment.
 
     Args:
         pose: Homogeneous matrix (4, 4), world frame.

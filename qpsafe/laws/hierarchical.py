@@ -110,7 +110,7 @@ class HierarchicalLaw(Fixed):
         else:
             tasks = problem.tasks[:1]
             J_1, xd_1 = tasks[0]
-            # what the source adds below the first task; its part in the range of P(J_1) is overruled by level 1
+            # what the paper adds below the first task; its part in the range of P(J_1) is overruled by level 1
             target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
             levels = [*problem.soft, (J_1, xd_1), (identity, target)]
         damping, square = [0.0] * len(levels), self.damping**2

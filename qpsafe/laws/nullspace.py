@@ -1,4 +1,4 @@
-"""The source's law by pseudoinverses and null-space projections, eqs. (17), (18), (20), (22). It knows no limits."""
+"""The paper's law by pseudoinverses and null-space projections, eqs. (17), (18), (20), (22). It knows no limits."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def paper_regime(problem: LawProblem, kept: int) -> NDArray[np.float64]:
 
 
 class NullspaceLaw:
-    """The law of the source: (18) for one task, (22) for two, the same blend of pure regimes for more.
+    """The law of the paper: (18) for one task, (22) for two, the same blend of pure regimes for more.
 
     It takes no notice of limits; the controller clips what it returns.
     """

@@ -34,7 +34,7 @@ LONGEST_TICK = 0.1
 
 
 def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
-    """The robot's thresholds (the IRB 140's are the source's): (18) for one task, (22) for two."""
+    """The robot's thresholds (the IRB 140's are the paper's): (18) for one task, (22) for two."""
     if len(tasks) <= 2:
         return Activation(robot_thresholds(robot)[: len(tasks)])
     raise ConfigurationError(

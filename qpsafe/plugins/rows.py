@@ -58,7 +58,7 @@ class EvasiveRows(OnRobot):
     """Δq = q̇0 dt, with a cost that grows as the tasks' release proceeds: cost² = c² + C² (1-m)/m.
 
     Of two wishes with the weights w and w (1-m)/m the compromise is m times the first and (1-m) times the second: the
-    source's blend (18), if C is about what the tasks cost that are to be released. With C = c the cost is c/sqrt(m),
+    paper's blend (18), if C is about what the tasks cost that are to be released. With C = c the cost is c/sqrt(m),
     and a call of `solve_ik` is `WeightedLaw`, whose weights m w and w_E are divided by m.
     """
 

@@ -14,7 +14,7 @@ class Wire(NamedTuple):
     """Segments of a robot with the velocities of their ends, world frame.
 
     Positions and velocities are linear along a segment: r_l = r0 + l (r1 - r0), v_l = v0 + l (v1 - v0), l in [0, 1],
-    eq. (4) of the source. A segment of length zero is allowed and still counts.
+    eq. (4) of the paper. A segment of length zero is allowed and still counts.
 
     Attributes:
         starts: r0, (links, 3) [m].

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 #: The file in the robot's folder that `load_calibration` reads.
 FILE_NAME = "calibration.toml"
-#: Range of distances that is fitted, the source's [m].
+#: Range of distances that is fitted, the paper's [m].
 FITTED = (0.20, 0.80)
 FEWEST = 6  # pairs a spot: twice the number of parameters
 #: Farther off the curve than this, and than this many robust standard deviations of the others, a pair is wrong [m].

@@ -41,7 +41,7 @@ class RunLog:
         orientation_error, position_error: Commanded pose against the reference (N, 3) [rad, m]; of a robot with several
             tools one after the other (N, 3 tools), as in the next three.
         measured_orientation_error, measured_position_error: The plant's pose against it (N, 3) [rad, m].
-        euler_error: The source's orientation error, difference of ZYX Euler angles (N, 3) [rad].
+        euler_error: The paper's orientation error, difference of ZYX Euler angles (N, 3) [rad].
         board_distance, person_distance: Smallest true distance robot-board, robot-person (N,) [m].
         solve_time: Wall time of `step` (N,) [s]; the only part that differs between equal runs.
         messages: (tick, message) of everything unusual.

@@ -144,7 +144,7 @@ def law_of(settings: Mapping[str, Any] | None) -> Law | None:
 
 def _choreography(choreography: Choreography) -> dict[str, Any]:
     if choreography.person.body != Person().body:
-        raise ConfigurationError("settings_of", "choreography.person.body", None, "the body of the source's person")
+        raise ConfigurationError("settings_of", "choreography.person.body", None, "the body of the paper's person")
     found = asdict(choreography)
     del found["person"]["body"]
     return found

@@ -37,7 +37,7 @@ def path(
 ) -> None:
     """Second experiment: follow a line back and forth while a person with a card board comes and goes.
 
-    Four runs: the hierarchical law (strict, and with the source's projection), the null-space law, and strict without
+    Four runs: the hierarchical law (strict, and with the paper's projection), the null-space law, and strict without
     suspension and recovery.
     """
     screen = console(json)

@@ -1,4 +1,4 @@
-"""The source's first experiment: a fixed tool reference while a person with a card board comes from three sides."""
+"""The paper's first experiment: a fixed tool reference while a person with a card board comes from three sides."""
 
 from __future__ import annotations
 
@@ -93,6 +93,6 @@ def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[
 
 
 def euler_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The source's orientation error: differences of the Euler angles φ, θ, ψ, wrapped to (-pi, pi] (3,) [rad]."""
+    """The paper's orientation error: differences of the Euler angles φ, θ, ψ, wrapped to (-pi, pi] (3,) [rad]."""
     difference = euler_zyx(target[:3, :3]) - euler_zyx(pose[:3, :3])
     return np.pi - np.mod(np.pi - difference, 2.0 * np.pi)

@@ -123,7 +123,7 @@ def promises(
     ]
     if "nullspace" in others:
         error, name = others["nullspace"].line_orientation, "null-space law: the same orientation error"
-        promised = "> 1e-3 rad, as the source reports"
+        promised = "> 1e-3 rad, as the paper reports"
         found.insert(1, name if error is None else Check(name, f"{error:.3g} rad", promised, bool(error > 1e-3)))
     for name, run in {"strict": strict, **others}.items():
         found.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", run.step - 1.0, 1e-9, "a_max dt"))

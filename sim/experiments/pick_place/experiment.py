@@ -1,4 +1,4 @@
-"""The source's third experiment: screws from a support into a box, while two people come for screws and bring some."""
+"""The paper's third experiment: screws from a support into a box, while two people come for screws and bring some."""
 
 from __future__ import annotations
 
