@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-slow dev lint bench clean
 
-demo: $(VENV)/.demo ## the source's first experiment: table, figure, csv, video
+demo: $(VENV)/.demo ## the paper's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
 
 test: $(VENV)/.dev

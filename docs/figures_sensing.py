@@ -153,7 +153,7 @@ def velocity() -> plt.Figure:
                 key: t[np.argmax(np.array(v) > activation.suspend_above)] for key, v in (("s", still), ("m", moving))
             }
             print(f"high danger {1e3 * (first['s'] - first['m']):.0f} ms earlier with the estimate")
-            axes[2].plot(t, still, color=GREY, linewidth=1.6, label="obstacle taken as standing still (source)")
+            axes[2].plot(t, still, color=GREY, linewidth=1.6, label="obstacle taken as standing still (paper)")
     approach = np.maximum(-np.gradient(true, t), 0.0)
     axes[1].plot(t, approach, color=GREY, linestyle="--", linewidth=1.0, label="true")
     axes[1].set_ylabel("approach\n[m/s]")

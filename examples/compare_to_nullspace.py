@@ -1,4 +1,4 @@
-"""The same law twice: hierarchical QPs (projection "paper", no active limits) against the source's eq. (22).
+"""The same law twice: hierarchical QPs (projection "paper", no active limits) against the paper's eq. (22).
 
 Exit code 1 if any joint velocity differs by more than 1e-8 rad/s. Run: python examples/compare_to_nullspace.py [STATES]
 """

@@ -7,7 +7,7 @@ from rich.table import Table
 import qpsafe
 
 robot = qpsafe.load_robot("irb140")
-field = qpsafe.DangerField()  # eq. (5); weights of the source
+field = qpsafe.DangerField()  # eq. (5); weights of the paper
 tip = robot.pose("tcp", robot.home)[:3, 3]
 
 # the joint velocity of least norm that moves the tip forward at 0.5 m/s

@@ -3,13 +3,12 @@
 import numpy as np
 
 import qpsafe
-from qpsafe.laws.problem import LawProblem, LawResult
 
 
 class SlowDownLaw:
     """q̇ = a_N q̇_task: full speed in low danger, standstill from where the lowest task is released completely."""
 
-    def solve(self, problem: LawProblem) -> LawResult:
+    def solve(self, problem: qpsafe.LawProblem) -> qpsafe.LawResult:
         """Scale the task's joint velocity, all joints by one factor so that the tool stays on its line."""
         J = np.vstack([task.jacobian for task in problem.tasks])
         xd = np.concatenate([task.velocity for task in problem.tasks])
@@ -18,7 +17,7 @@ class SlowDownLaw:
             room = np.where(qd > 0.0, problem.upper, -problem.lower)  # towards where each joint moves
             qd = qd * np.clip(room / np.maximum(np.abs(qd), 1e-12), 0.0, 1.0).min()
             qd = np.clip(qd, problem.lower, problem.upper)  # where a joint has to brake at once
-        return LawResult(qd)
+        return qpsafe.LawResult(qd)
 
 
 robot = qpsafe.load_robot("irb140")

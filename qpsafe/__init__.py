@@ -5,14 +5,18 @@ Names are imported when first used, so that `import qpsafe` stays quick.
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
 #: Public name -> module that defines it.
 _PUBLIC = {
     "Activation": "qpsafe.danger.activation",
+    "Box": "qpsafe.limits",
     "ConfigurationError": "qpsafe.errors",
     "DangerBarrier": "qpsafe.laws.barrier",
     "DangerField": "qpsafe.danger.field",
@@ -23,6 +27,9 @@ _PUBLIC = {
     "JointLimits": "qpsafe.limits",
     "JointReference": "qpsafe.reference",
     "JointTask": "qpsafe.tasks.joint",
+    "Law": "qpsafe.laws.problem",
+    "LawProblem": "qpsafe.laws.problem",
+    "LawResult": "qpsafe.laws.problem",
     "Level": "qpsafe.hqp.level",
     "NullspaceLaw": "qpsafe.laws.nullspace",
     "Obstacle": "qpsafe.sensing.hulls",
@@ -33,13 +40,16 @@ _PUBLIC = {
     "QpsafeError": "qpsafe.errors",
     "RecoveryRules": "qpsafe.recovery.recovery",
     "RelativeFrameTask": "qpsafe.tasks.frame",
+    "Robot": "qpsafe.robot.robot",
     "RobotFileError": "qpsafe.errors",
     "RobotWarning": "qpsafe.errors",
     "SafetyController": "qpsafe.controller",
+    "Sample": "qpsafe.tasks.trajectory",
     "SensingRules": "qpsafe.sensing.rules",
     "SpotArray": "qpsafe.sensing.spots",
     "StopCategory": "qpsafe.irc5.supervisor",
     "Supervisor": "qpsafe.irc5.supervisor",
+    "Task": "qpsafe.tasks.task",
     "Threshold": "qpsafe.danger.activation",
     "Tick": "qpsafe.tick",
     "WeightedLaw": "qpsafe.laws.weighted",
@@ -50,8 +60,8 @@ _PUBLIC = {
     "load_program": "qpsafe.tasks.program_file",
     "load_robot": "qpsafe.robot.loader",
     "load_spots": "qpsafe.sensing.spots",
-    "robot_activation": "qpsafe.danger.thresholds",
     "nullspace_velocity": "qpsafe.laws.nullspace",
+    "robot_activation": "qpsafe.danger.thresholds",
     "solve_hierarchy": "qpsafe.hqp.solve",
 }
 
@@ -76,12 +86,17 @@ if TYPE_CHECKING:
     from qpsafe.laws.hierarchical import HierarchicalLaw as HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw as NullspaceLaw
     from qpsafe.laws.nullspace import nullspace_velocity as nullspace_velocity
+    from qpsafe.laws.problem import Law as Law
+    from qpsafe.laws.problem import LawProblem as LawProblem
+    from qpsafe.laws.problem import LawResult as LawResult
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
+    from qpsafe.limits import Box as Box
     from qpsafe.limits import JointLimits as JointLimits
     from qpsafe.recovery.recovery import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference
     from qpsafe.robot.loader import bundled_robots as bundled_robots
     from qpsafe.robot.loader import load_robot as load_robot
+    from qpsafe.robot.robot import Robot as Robot
     from qpsafe.robot.wire import Wire as Wire
     from qpsafe.sensing.calibration import load_converter as load_converter
     from qpsafe.sensing.cell_file import load_cell as load_cell
@@ -97,19 +112,31 @@ if TYPE_CHECKING:
     from qpsafe.tasks.position import PositionTask as PositionTask
     from qpsafe.tasks.program import Program as Program
     from qpsafe.tasks.program_file import load_program as load_program
+    from qpsafe.tasks.task import Task as Task
     from qpsafe.tasks.trajectory import FixedPose as FixedPose
+    from qpsafe.tasks.trajectory import Sample as Sample
     from qpsafe.tick import Tick as Tick
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name from its module on first use."""
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'qpsafe' has no attribute {name!r}")
-    value = getattr(import_module(_PUBLIC[name]), name)
-    globals()[name] = value
-    return value
+class _OnFirstUse(ModuleType):
+    """This module: a name not used yet is a property, so that completing ``qpsafe.`` by TAB imports nothing."""
+
+
+def _wait_for_use(name: str, where: str) -> None:
+    def use(module: ModuleType) -> object:
+        vars(module)[name] = value = getattr(import_module(where), name)
+        with suppress(AttributeError):  # another thread was first
+            delattr(_OnFirstUse, name)
+        return value
+
+    setattr(_OnFirstUse, name, property(use))
+
+
+for _name, _where in _PUBLIC.items():
+    _wait_for_use(_name, _where)
+sys.modules[__name__].__class__ = _OnFirstUse
 
 
 def __dir__() -> list[str]:
     """Public names, imported or not."""
-    return sorted({*globals(), *_PUBLIC})
+    return __all__

@@ -60,15 +60,15 @@ class SafetyController(Parts):
         tasks: What it is asked to do, highest priority first.
         law: How tasks and evasion are combined; `HierarchicalLaw()` by default.
         dt: Tick [s]; the IRC5 wants 0.004.
-        field: The danger field; the source's weights by default.
-        activation: Thresholds of the tasks; the robot's for one or two tasks (the source's on the IRB 140).
+        field: The danger field; the paper's weights by default.
+        activation: Thresholds of the tasks; the robot's for one or two tasks (the paper's on the IRB 140).
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; "off" switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
-        barrier: A cap on the danger field, beyond the source; none by default.
+        barrier: A cap on the danger field, beyond the paper; none by default.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -95,7 +95,7 @@ class SafetyController(Parts):
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
         self._dt = checked_dt("SafetyController", dt)
-        check_tasks(robot, tasks, self._dt)
+        self._labels = check_tasks(robot, tasks, self._dt)
         self._tasks = tuple(tasks)
         self._law = HierarchicalLaw() if law is None else checked_law(law)
         self._field = DangerField() if field is None else checked_field(field)
@@ -126,8 +126,7 @@ class SafetyController(Parts):
         self._units.reset()
         rules = self._recovery_rules
         self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)
-        self._seq = -1
-        self._active = False
+        self._seq, self._active = -1, False
         self._q = self._robot.home
         self._qd = self._qd_before = np.zeros(self._robot.nq)
 
@@ -258,6 +257,7 @@ class SafetyController(Parts):
             events=recovery.due_events(),
             waits_for=recovery.waits_for,
             joint_names=self._robot.joint_names,
+            task_names=self._labels,
             resolved=resolved,
             off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -43,6 +44,9 @@ class Box(NamedTuple):
     upper_kind: NDArray[np.int64]
     sacrificed: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        return call(self, self.lower, self.upper)
+
     def clip(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
         """The nearest velocity inside the box; `qd` must be finite."""
         return np.minimum(np.maximum(qd, self.lower), self.upper)
@@ -53,7 +57,13 @@ class Box(NamedTuple):
         return admitted, _admit(qd, self.lower, self.upper, self.sacrificed, admitted)
 
     def binding(self, qd: NDArray[np.float64], names: tuple[str, ...], tolerance: float = 1e-9) -> tuple[str, ...]:
-        """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``."""
+        """Limits that `qd` (n,) touches, e.g. ``"joint_2: upper acceleration"``.
+
+        Args:
+            qd: (n,) [rad/s].
+            names: Of the joints.
+            tolerance: What counts as touching [rad/s].
+        """
         found = []
         for i, name in enumerate(names):
             if qd[i] >= self.upper[i] - tolerance:
@@ -64,8 +74,6 @@ class Box(NamedTuple):
 
     def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """What was sacrificed, in words, one entry per joint concerned."""
-        if not self.sacrificed.any():
-            return ()
         return tuple(f"{names[i]}: {KINDS[kind]} limit sacrificed" for i, kind in enumerate(self.sacrificed) if kind)
 
 
@@ -119,6 +127,9 @@ class JointLimits(Fixed):
 
         self.table = np.array((self.lower, self.upper, self.max_velocity, self.max_acceleration))  # for compiled code
 
+    def __repr__(self) -> str:
+        return call(self, max_velocity=self.max_velocity, max_acceleration=self.max_acceleration, dt=self.dt)
+
     @classmethod
     def of(cls, robot: Robot, dt: float = 0.004) -> JointLimits:
         """The robot's own limits, sampled at dt [s]."""
@@ -156,6 +167,12 @@ class JointLimits(Fixed):
 
 def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, dt: float) -> JointLimits | None:
     """`limits`, if they fit the robot and the tick; the robot's own for None or "robot"; None for "off".
+
+    Args:
+        where: Who asks, for the error.
+        limits: As given.
+        robot: Whose joints these are.
+        dt: Tick [s].
 
     Raises:
         ConfigurationError: They do not, in the name of `where`.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +52,15 @@ class JointReference:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, JointReference):
             return NotImplemented
-        if (self.seq, self.active) != (other.seq, other.active) or not _same(self.time, other.time):
-            return False
-        mine, others = (r.gains if r.gains is not None else (None,) * 3 for r in (self, other))
-        pairs = zip((self.q, self.qd, self.torque, *mine), (other.q, other.qd, other.torque, *others), strict=True)
-        return all(_same(a, b) for a, b in pairs)
+        return all(same(getattr(self, part.name), getattr(other, part.name)) for part in fields(self))
 
     __hash__ = None  # type: ignore[assignment]  # holds arrays
 
 
-def _same(a: NDArray[np.float64] | float | None, b: NDArray[np.float64] | float | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return np.array_equal(a, b, equal_nan=True)
+def same(a: Any, b: Any) -> bool:
+    """Whether two values, arrays or tuples of them say the same; NaN is equal to NaN."""
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if a is None or b is None or isinstance(a, str | tuple | bool) or isinstance(b, str | tuple | bool):
+        return bool(a is b or (type(a) is type(b) and a == b))
+    return np.array_equal(a, b, equal_nan=True) if isinstance(a, np.ndarray | float) else bool(a == b)

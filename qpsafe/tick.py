@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.pipeline.resolve import Resolved
-from qpsafe.reference import JointReference
+from qpsafe.reference import JointReference, same
 from qpsafe.text.words import counted
 
 #: The tick went as planned.
@@ -27,9 +27,12 @@ def _no_vectors() -> NDArray[np.float64]:
     return np.zeros((0, 3))
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False, repr=False)
 class Tick:
     """Result of `SafetyController.step`.
+
+    Two are equal if they say the same, NaN included, however long they took. It can be copied, pickled, and changed by
+    `dataclasses.replace`.
 
     Attributes:
         reference: Joint references for the robot.
@@ -53,6 +56,7 @@ class Tick:
         unseen: Names of the spots that cannot be trusted now, sick or in another unit than metres: nobody knows what is
             in front of them.
         joint_names: (n,) names used in reports.
+        task_names: Likewise, one a task.
         resolved: What tasks, limits and law came to; None if they were not asked.
         off_path: The `errors` where the references of this tick were not the tasks' own trajectories.
     """
@@ -77,8 +81,9 @@ class Tick:
     severity: str = "clear"
     unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
-    resolved: Resolved | None = field(default=None, repr=False)
-    off_path: tuple[NDArray[np.float64], ...] | None = field(default=None, repr=False)
+    task_names: tuple[str, ...] = ()
+    resolved: Resolved | None = None
+    off_path: tuple[NDArray[np.float64], ...] | None = None
 
     @property
     def errors(self) -> tuple[NDArray[np.float64], ...]:
@@ -114,8 +119,9 @@ class Tick:
             f"{self.regime} danger, {self.phase}",
             f"  {counted(len(self.points), 'point')}, CDF_n = {self.cdf_n:.3f}, m = {self.m:.3f}, f = {self.f:.3f}",
         ]
-        for k, (error, activation) in enumerate(zip(self.errors, self.activations, strict=False)):
-            lines.append(f"  task {k + 1}: activation {activation:.3f}, error norm {np.linalg.norm(error):.3g}")
+        names = self.task_names or tuple(f"task {k + 1}" for k in range(len(self.activations)))
+        for name, error, activation in zip(names, self.errors, self.activations, strict=False):
+            lines.append(f"  {name}: activation {activation:.3f}, error norm {np.linalg.norm(error):.3g}")
         for weight, residuals in self.residuals:
             levels = ", ".join(f"{value:.3g}" for value in residuals)
             lines.append(f"  QP of weight {weight:.3f}: residual per level, highest priority first, {levels}")
@@ -129,3 +135,16 @@ class Tick:
         return "\n".join(lines)
 
     __str__ = explain
+
+    def __repr__(self) -> str:
+        words = f"{self.reference.seq}, {self.status}, {self.regime} danger, {self.phase}"
+        return f"Tick({words}, cdf_n={self.cdf_n:.4g}, m={self.m:.4g}, f={self.f:.4g}, qd={self.reference.qd.round(4)})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Tick):
+            return NotImplemented
+        told = [part.name for part in fields(self) if part.name not in ("solve_time", "resolved")]
+        names = (*told, "errors", "box")
+        return all(same(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]  # holds arrays

@@ -12,6 +12,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.rotation import log3
 from qpsafe.tasks.task import Misfit, PoseTask
 from qpsafe.tasks.trajectory import Sample, Trajectory
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -21,7 +22,7 @@ ALL = (0, 1, 2, 3, 4, 5)
 
 
 class FrameTask(PoseTask):
-    """Keep the pose of a frame, or some rows of it, on a trajectory: the source picks rows of J_ee in the same way.
+    """Keep the pose of a frame, or some rows of it, on a trajectory: the paper picks rows of J_ee in the same way.
 
     e = (x_d - x, log(R_d Rᵀ)) in world axes [m, rad]. A single angular row says what it seems to say only while the
     other angles are small.
@@ -43,6 +44,9 @@ class FrameTask(PoseTask):
             raise ConfigurationError(type(self).__name__, "rows", rows, "some of 0 to 5, in increasing order")
         self.rows = tuple(int(row) for row in rows)
         super().__init__(frame, trajectory, gain)
+
+    def __repr__(self) -> str:
+        return call(self, *self.frames, self.trajectory, gain=self.gain, rows=self.rows)
 
     def error(self, value: NDArray[np.float64], sample: Sample) -> NDArray[np.float64]:
         """Rows of (x_d - x, log(R_d Rᵀ)), (rows,) [m, rad]."""

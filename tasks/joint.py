@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.task import Misfit, Task
 from qpsafe.tasks.trajectory import FixedJoints, JointSample, Trajectory
-from qpsafe.text.words import counted
+from qpsafe.text.words import call, counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -42,6 +42,9 @@ class JointTask(Task):
             raise ConfigurationError(type(self).__name__, "joints", joints, "different numbers from 0, or None")
         self.joints = None if joints is None else tuple(int(joint) for joint in joints)
         self._endless: NDArray[np.bool_] | None = None  # of the robot whose value was last asked for
+
+    def __repr__(self) -> str:
+        return call(self, self.trajectory, gain=self.gain, joints=self.joints)
 
     def value(self, state: RobotState) -> NDArray[np.float64]:
         """All joint positions (n,) [rad]."""

@@ -13,6 +13,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, log3
 from qpsafe.tasks.timing import Rates, TimeLaw
 from qpsafe.tasks.trajectory import JointSample, Sample, checked_pose, checked_vector
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -64,6 +65,9 @@ class Line(Fixed):
         #: Time law of the share u of the way, from 0 to 1.
         self.law = TimeLaw([0.0], [1.0], [tightest.speed], [tightest.acceleration], [tightest.jerk])
         self.duration = self.law.duration
+
+    def __repr__(self) -> str:
+        return call(self, self.start[:3, 3], self.goal[:3, 3], duration=self.duration)
 
     def sample(self, t: float) -> Sample:
         """Reference at time t [s]."""
@@ -150,6 +154,9 @@ class Dwell(Fixed):
             raise ConfigurationError("Dwell", "duration", duration, "a finite time >= 0 [s]")
         self.pose, self.duration = checked_pose("Dwell", "pose", pose), float(duration)
 
+    def __repr__(self) -> str:
+        return call(self, self.pose[:3, 3], duration=self.duration)
+
     def sample(self, t: float) -> Sample:
         """The pose, at rest."""
         return Sample(self.pose, np.zeros(6))
@@ -179,6 +186,9 @@ class JointMove(Fixed):
         self.law = TimeLaw(start, goal, speed, acceleration, jerk, velocity, start_acceleration)
         self.duration = self.law.duration
 
+    def __repr__(self) -> str:
+        return call(self, *(self.law.at(t).position for t in (0.0, self.duration)), duration=self.duration)
+
     def sample(self, t: float) -> JointSample:
         """Joint positions and velocities at time t [s]."""
         motion = self.law.at(t)
@@ -199,6 +209,9 @@ class JointMoveOfFrame(Fixed):
     def __init__(self, robot: Robot, frame: str, move: JointMove) -> None:
         self.robot, self.frame, self.move = robot, frame, move
         self.duration = move.duration
+
+    def __repr__(self) -> str:
+        return call(self, self.frame, self.move)
 
     def sample(self, t: float) -> Sample:
         """Pose and twist J q̇ of the frame at time t [s]."""

@@ -1,4 +1,4 @@
-"""Orientation of a frame: the source's low-priority task."""
+"""Orientation of a frame: the paper's low-priority task."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class OrientationTask(PoseTask):
     """Keep the orientation of a frame on its trajectory [rad].
 
     - ``"rotation vector"``: e = log(R_d Rᵀ) in world axes, without a singular orientation below half a turn.
-    - ``"euler"``: e = differences of the source's Euler angles φ, θ, ψ about z, y', x''; singular at θ = ±pi/2, where
-      the Jacobian grows without bound. For comparison with the source.
+    - ``"euler"``: e = differences of the paper's Euler angles φ, θ, ψ about z, y', x''; singular at θ = ±pi/2, where
+      the Jacobian grows without bound. For comparison with the paper.
 
     Args:
         frame: Frame whose orientation is controlled.
         trajectory: Where it should be.
-        gain: K_L [1/s]; the source used 10.
+        gain: K_L [1/s]; the paper used 10.
         form: How the error is expressed.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Position of a frame: the source's high-priority task."""
+"""Position of a frame: the paper's high-priority task."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class PositionTask(PoseTask):
     Args:
         frame: Frame whose origin is controlled.
         trajectory: Where it should be.
-        gain: K_H [1/s]; the source used 1.
+        gain: K_H [1/s]; the paper used 1.
     """
 
     rows = (0, 1, 2)

@@ -13,6 +13,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.moves import Move
 from qpsafe.tasks.trajectory import Sample
+from qpsafe.text.words import counted
 
 
 class Event(NamedTuple):
@@ -63,6 +64,10 @@ class Program(Fixed):
         #: Events of one cycle, in their order.
         self.events = tuple(sorted((Event(starts[place], name) for place, name in events), key=lambda e: e.time))
         self._last: tuple[float, Sample] | None = None  # several tasks ask for the same time
+
+    def __repr__(self) -> str:
+        moves, events = counted(len(self.moves), "move"), counted(len(self.events), "event")
+        return f"Program({self.frame!r}, {moves}, {events}, duration={self.duration:.4g}, cycle={self.cycle})"
 
     def sample(self, t: float) -> Sample:
         """Reference at time t [s]; at rest at the last goal after the end, unless it is a cycle."""

@@ -28,6 +28,13 @@ class UnreachableError(QpsafeError, ValueError):
 def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int = 200) -> Array:
     """Joint positions (n,) at which `frame` has `pose` (4, 4), by damped Gauss-Newton from a guess, inside the limits.
 
+    Args:
+        robot: The robot.
+        frame: One of its frames.
+        pose: Where it should be (4, 4) [m].
+        guess: Where to start (n,) [rad].
+        steps: How many are tried.
+
     Raises:
         UnreachableError: None was found from this guess.
     """
@@ -64,6 +71,12 @@ def checked_poses(move: Line) -> int:
 
 def follow(robot: Robot, frame: str, move: Line, q: Array) -> Array:
     """Joint positions (n,) at the end of a line or an arc that starts at q.
+
+    Args:
+        robot: The robot.
+        frame: What moves along the line.
+        move: A line or an arc.
+        q: At its start (n,) [rad].
 
     Raises:
         UnreachableError: A pose on the way cannot be taken, or some joint would be too fast.

@@ -1,4 +1,4 @@
-"""Rotation matrices, rotation vectors and the source's Euler angles."""
+"""Rotation matrices, rotation vectors and the paper's Euler angles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_rotation(R: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
 def euler_zyx(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Euler angles (φ, θ, ψ) about z, y', x'' of rotation matrices (..., 3, 3): R = Rz(φ) Ry(θ) Rx(ψ), (..., 3) [rad].
 
-    The source does not name its convention; this is the one of ABB's controllers. It is singular at θ = ±pi/2, where φ
+    The paper does not name its convention; this is the one of ABB's controllers. It is singular at θ = ±pi/2, where φ
     and ψ are not unique. Offered for comparison and plots.
     """
     phi = np.arctan2(R[..., 1, 0], R[..., 0, 0])

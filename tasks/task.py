@@ -14,6 +14,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.clik import Clik, pose_clik
 from qpsafe.tasks.trajectory import Sample, Trajectory
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -45,7 +46,7 @@ class Task(Fixed, ABC):
 
     fixed = frozenset(("trajectory", "gain"))
     #: Name shown in reports.
-    name: str
+    name: str = "task"
     #: Frames the value is made of.
     frames: tuple[str, ...] = ()
     #: Whether a path waits, at its events and after a suspension, until this task is met.
@@ -59,6 +60,14 @@ class Task(Fixed, ABC):
             raise ConfigurationError(type(self).__name__, "trajectory", trajectory, expected)
         self.trajectory = trajectory
         self.gain = float(gain)
+
+    def __repr__(self) -> str:
+        return call(self, *self.frames, self.trajectory, gain=self.gain)
+
+    @property
+    def label(self) -> str:
+        """Its name and frames, as reports show them: ``position of tcp``."""
+        return " of ".join((self.name, " in ".join(self.frames))) if self.frames else self.name
 
     @abstractmethod
     def value(self, state: RobotState) -> NDArray[np.float64]:
@@ -150,5 +159,11 @@ class PoseTask(Task):
 
 
 def errors_of(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
-    """Errors (rows,) of tasks against their own trajectories at a time on the path [s]; the caller's own arrays."""
+    """Errors (rows,) of tasks against their own trajectories at a time on the path [s]; the caller's own arrays.
+
+    Args:
+        tasks: Highest priority first.
+        state: Where the robot is.
+        time: On the path [s].
+    """
     return tuple([np.array(task.error(task.value(state), task.trajectory.sample(time))) for task in tasks])

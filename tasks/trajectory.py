@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, exp3_jacobian, is_rotation, log3
+from qpsafe.text.words import call
 
 
 class Sample(NamedTuple):
@@ -23,6 +24,9 @@ class Sample(NamedTuple):
 
     pose: NDArray[np.float64]
     twist: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return call(self, position=self.pose[:3, 3], rotation=log3(self.pose[:3, :3]), twist=self.twist)
 
     @property
     def finite(self) -> bool:
@@ -61,6 +65,9 @@ class JointSample(NamedTuple):
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        return call(self, self.position, velocity=self.velocity)
+
     @property
     def finite(self) -> bool:
         """Whether the reference can be followed at all."""
@@ -88,7 +95,7 @@ class Trajectory(Protocol):
 
 
 class FixedPose(Fixed):
-    """A reference that does not move, as in the source's first experiment.
+    """A reference that does not move, as in the paper's first experiment.
 
     Args:
         pose: Homogeneous matrix (4, 4), world frame.
@@ -103,6 +110,9 @@ class FixedPose(Fixed):
         self.pose = checked_pose("FixedPose", "pose", pose)
         self._sample = Sample(self.pose, np.zeros(6))
         self._sample.twist.flags.writeable = False
+
+    def __repr__(self) -> str:
+        return call(self, position=self.pose[:3, 3], rotation=log3(self.pose[:3, :3]))
 
     def sample(self, t: float) -> Sample:
         """The same pose at every time, at rest."""
@@ -124,13 +134,23 @@ class FixedJoints(Fixed):
     def __init__(self, position: ArrayLike) -> None:
         self.position = checked_vector("FixedJoints", "position", position)
 
+    def __repr__(self) -> str:
+        return call(self, self.position)
+
     def sample(self, t: float) -> JointSample:
         """The same positions at every time, at rest."""
         return JointSample(self.position, np.zeros_like(self.position))
 
 
 def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = None) -> NDArray[np.float64]:
-    """`vector` as a read-only (n,) array of finite numbers, or a ConfigurationError that says what is wrong."""
+    """`vector` as a read-only (n,) array of finite numbers, or a ConfigurationError that says what is wrong.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        vector: As given.
+        size: n; any if None.
+    """
     expected = f"{'some' if size is None else size} finite numbers"
     try:
         array = np.array(vector, dtype=float)
@@ -143,7 +163,13 @@ def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = N
 
 
 def checked_pose(where: str, key: str, pose: ArrayLike) -> NDArray[np.float64]:
-    """`pose` as a read-only (4, 4) array, or a ConfigurationError that says what is wrong."""
+    """`pose` as a read-only (4, 4) array, or a ConfigurationError that says what is wrong.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        pose: As given.
+    """
     expected = "a homogeneous matrix (4, 4) with a proper rotation and last row 0 0 0 1"
     try:
         matrix = np.array(pose, dtype=float)

@@ -52,7 +52,13 @@ def bench(
 
 
 def show(times: dict[str, Times], machine: dict[str, str], screen: Console) -> None:
-    """Print the percentiles and ratios."""
+    """Print the percentiles and ratios.
+
+    Args:
+        times: Of every row that was timed.
+        machine: What it was timed on, by name.
+        screen: Where to.
+    """
     from qpsafe.cli.sheet import Sheet
 
     title = f"Wall time [µs], one thread, blocks in turn: {machine['processor']}, Python {machine['python']}"
@@ -77,7 +83,13 @@ def _compilation(screen: Console, out: Path | None, json: bool) -> None:
 
 
 def show_compilation(first: Start, later: Start, screen: Console) -> None:
-    """Print what each kernel takes."""
+    """Print what each kernel takes.
+
+    Args:
+        first: A start that compiles.
+        later: One that finds everything compiled.
+        screen: Where to.
+    """
     from qpsafe.cli.sheet import Sheet
 
     sheet = Sheet("Processor time of each kernel", ("kernel", "compiled [s]", "from the cache [ms]"))

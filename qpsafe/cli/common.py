@@ -56,7 +56,13 @@ class SensorName(StrEnum):
 
 
 def make_law(name: LawName, projection: ProjectionName, solver: str | None = None) -> Law:
-    """The law of the given name."""
+    """The law of the given name.
+
+    Args:
+        name: Which law.
+        projection: Of the nullspace law; the others take no notice.
+        solver: Of the hierarchical law; its default if None.
+    """
     from qpsafe.laws.hierarchical import HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw
     from qpsafe.laws.weighted import WeightedLaw
@@ -81,7 +87,13 @@ def console(json_output: bool) -> Console:
 
 
 def verdict(good: bool, yes: str = "kept", no: str = "NOT kept") -> Text:
-    """A word in green, or another one in red."""
+    """A word in green, or another one in red.
+
+    Args:
+        good: Which of the two.
+        yes: The green word.
+        no: The red one.
+    """
     from rich.text import Text
 
     return Text(yes, "green") if good else Text(no, "red")
@@ -112,7 +124,14 @@ def progress_bar(screen: Console) -> Iterator[Progress]:
 
 
 def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: Sequence[str] = ()) -> None:
-    """Print what was measured beside what was promised, and which promises the run could neither keep nor break."""
+    """Print what was measured beside what was promised, and which promises the run could neither keep nor break.
+
+    Args:
+        title: Of the table.
+        checks: What was promised and measured.
+        screen: Where to.
+        left_out: Promises that do not apply to this run, in words.
+    """
     from qpsafe.cli.sheet import Sheet
 
     sheet = Sheet(title, ("", "", "measured", "promised"), text=range(4))
@@ -127,6 +146,12 @@ def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: 
 
 def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], screen: Console, as_json: bool) -> None:
     """Print results of cases, as a table or as JSON.
+
+    Args:
+        results: Each with `ok`, and what its `to_dict` or `show` needs.
+        show: Prints one result.
+        screen: Where to.
+        as_json: JSON instead.
 
     Raises:
         typer.Exit: With code 1, a case was not kept.

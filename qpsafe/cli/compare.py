@@ -1,4 +1,4 @@
-"""`qpsafe compare`: the QP laws against the source's null-space laws (18) and (22)."""
+"""`qpsafe compare`: the QP laws against the paper's null-space laws (18) and (22)."""
 
 from __future__ import annotations
 

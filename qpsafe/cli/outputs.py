@@ -16,7 +16,13 @@ DRAWN = (".png", ".pdf", ".svg")
 
 
 def output_folder(context: typer.Context, param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Callback of an option: a folder that results can be written into, made later if it is not there."""
+    """Callback of an option: a folder that results can be written into, made later if it is not there.
+
+    Args:
+        context: The command's.
+        param: The option.
+        value: What was typed, None for nothing.
+    """
     if value is not None and not context.resilient_parsing:
         try_folder(context.command_path, param.opts[0], value)
     return value
@@ -35,6 +41,11 @@ def output_file(*suffixes: str) -> Callable[[typer.Context, typer.CallbackParam,
 
 def try_folder(where: str, key: str, path: Path) -> None:
     """Write something into a folder and leave no trace; folders that are not there are made and removed again.
+
+    Args:
+        where: Who asks, for the error.
+        key: The option's name, for the error.
+        path: The folder.
 
     Raises:
         ConfigurationError: It cannot be made, or nothing can be written into it.
@@ -57,6 +68,12 @@ def try_folder(where: str, key: str, path: Path) -> None:
 
 def try_file(where: str, key: str, path: Path, *suffixes: str) -> None:
     """Write beside a file, as its own writer will before it takes its place, and leave no trace.
+
+    Args:
+        where: Who asks, for the error.
+        key: The option's name, for the error.
+        path: The file.
+        suffixes: Endings it may have; none for any.
 
     Raises:
         ConfigurationError: It is a folder or a device, its folder is not there, nothing can be written there, or it

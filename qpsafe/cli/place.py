@@ -1,4 +1,4 @@
-"""`qpsafe place`: how many distance sensors a robot needs, and where, section III of the source."""
+"""`qpsafe place`: how many distance sensors a robot needs, and where, section III of the paper."""
 
 from __future__ import annotations
 

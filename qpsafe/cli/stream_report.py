@@ -28,7 +28,17 @@ def result_of(
     grants: list[Grant],
     writer: ReferenceWriter | None,
 ) -> dict[str, Any]:
-    """The report, as JSON shows it."""
+    """The report, as JSON shows it.
+
+    Args:
+        run: What the run was asked to be.
+        loop: The loop, after it.
+        streamer: The robot's end of it.
+        inlet: Where distances came in; None without.
+        dog: The watchdog; None if nobody watches.
+        grants: What the system granted of real time.
+        writer: Of the log; None without.
+    """
     counts, supervisor = streamer.counts, loop.supervisor
     late = run.latency.above(PERIOD)
     lost = counts["missed"] + counts["superseded"]

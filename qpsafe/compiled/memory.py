@@ -16,7 +16,13 @@ from numba.np.arrayobj import make_array, populate_array
 
 
 def view(block: Any, start: int, shape: tuple[int, ...]) -> Any:
-    """An array of the given shape in the memory of a contiguous one, from its element `start` on."""
+    """An array of the given shape in the memory of a contiguous one, from its element `start` on.
+
+    Args:
+        block: A contiguous array.
+        start: Place of the first element in it.
+        shape: Of the result.
+    """
     return np.reshape(block, -1)[start : start + prod(shape)].reshape(shape)
 
 

@@ -1,7 +1,7 @@
 """When tasks are released: the smooth activations m and f, eqs. (19) and (21), and the regimes of Table I.
 
 Every task has one threshold. With the danger rising, the task of lowest priority is released first. For two tasks the
-source's parameters are a_1 = m and a_2 = m f, and the regimes are its low, medium and high danger. Neighbouring tasks
+paper's parameters are a_1 = m and a_2 = m f, and the regimes are its low, medium and high danger. Neighbouring tasks
 with equal thresholds are released together, by one switch: the positions of two tools at m, their orientations at m f.
 """
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.words import call
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Activation(Fixed):
     """Activations 1 >= a_1 >= ... >= a_N >= 0 of N tasks, highest priority first, from the danger CDF_n.
 
     Args:
-        thresholds: One per task, highest priority first; equal neighbours share a switch. Defaults to the source's
+        thresholds: One per task, highest priority first; equal neighbours share a switch. Defaults to the paper's
             values for two tasks: Δ = 11.5, ε = 0.15 for the high-priority task (m) and Δ_f = 7.5, ε_f = 0.25 for the
             low one (f).
 
@@ -110,6 +111,9 @@ class Activation(Fixed):
                     lower,
                     f"Δ(1+ε) <= {upper.start:g}, where the release of the task above it begins (found {lower.end:g})",
                 )
+
+    def __repr__(self) -> str:
+        return call(self, self.thresholds)
 
     @property
     def suspend_above(self) -> float:
@@ -154,7 +158,7 @@ class Activation(Fixed):
     def regime(self, cdf_n: float) -> str:
         """Name of the danger level (Table I): ``low``, ``medium`` or ``high``.
 
-        A level begins where its release begins, Δ(1-ε), as the source shades its figures. With more than two different
+        A level begins where its release begins, Δ(1-ε), as the paper shades its figures. With more than two different
         thresholds the levels between are named ``medium-1`` (most released) to ``medium-(N-1)``.
         """
         return self._names[sum([cdf_n <= threshold.start for threshold in self.levels])]

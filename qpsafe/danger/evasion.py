@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
@@ -116,6 +117,9 @@ class Evasion:
         for array in (self._mass, self._damping, self._A, self._B):
             array.flags.writeable = False
         self.velocity = np.zeros(n)
+
+    def __repr__(self) -> str:
+        return call(self, mass=np.diag(self._mass), damping=np.diag(self._damping), dt=self._dt)
 
     @classmethod
     def default(cls, n: int, dt: float) -> Evasion:

@@ -1,4 +1,4 @@
-"""The danger field of a robot, eqs. (1) to (6) of the source: how dangerous its motion is for a point in space."""
+"""The danger field of a robot, eqs. (1) to (6) of the paper: how dangerous its motion is for a point in space."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class DangerField:
     to every point. Equal input gives equal bits.
 
     Attributes:
-        static: weight k1 >= 0 of the static field (1); 1 in the source.
-        kinetic: weight k2 >= 0 of the kinetic field (2) [s/m]; 1 in the source.
-        gamma: share of the speed that counts in every direction, in gamma + cos; 1 in the source. Not below 1, else
+        static: weight k1 >= 0 of the static field (1); 1 in the paper.
+        kinetic: weight k2 >= 0 of the kinetic field (2) [s/m]; 1 in the paper.
+        gamma: share of the speed that counts in every direction, in gamma + cos; 1 in the paper. Not below 1, else
             motion away from a point would count as safer than no motion, and the field could be negative.
         floor: a point nearer to a link than this [m] is evaluated at this distance from that link, on the same side;
             a point on the link, on the side that the link moves to. Keeps the field bounded.
@@ -96,9 +96,21 @@ class DangerField:
         return value, gradient
 
     def value(self, points: ArrayLike, wire: Wire, point_velocities: ArrayLike | None = None) -> NDArray[np.float64]:
-        """CDF (p,), eq. (5); arguments as for `evaluate`."""
+        """CDF (p,), eq. (5); arguments as for `evaluate`.
+
+        Args:
+            points: Detected points p, (p, 3) [m].
+            wire: The robot's segments and their velocities.
+            point_velocities: As for `evaluate`; at rest by default.
+        """
         return self.evaluate(points, wire, point_velocities)[0]
 
     def vectors(self, points: ArrayLike, wire: Wire, point_velocities: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Vector field (p, 3), eq. (6), zero where the gradient is; arguments as for `evaluate`."""
+        """Vector field (p, 3), eq. (6), zero where the gradient is; arguments as for `evaluate`.
+
+        Args:
+            points: Detected points p, (p, 3) [m].
+            wire: The robot's segments and their velocities.
+            point_velocities: As for `evaluate`; at rest by default.
+        """
         return danger_vectors(*self.evaluate(points, wire, point_velocities))

@@ -1,7 +1,7 @@
-"""Compiled danger field of straight moving links: eqs. (1) to (5) of the source in closed form, with the gradient.
+"""Compiled danger field of straight moving links: eqs. (1) to (5) of the paper in closed form, with the gradient.
 
 A link is r_l = r0 + l d, v_l = v0 + l δ, l in [0, 1] (not arc length), with velocities relative to that of the point p.
-Let w = p - r_l, R = |w|. With weights k1, k2, gamma, all 1 in the source,
+Let w = p - r_l, R = |w|. With weights k1, k2, gamma, all 1 in the paper,
 
     CDF = sum over links of  k1 S + k2 (gamma K2 + K1),   S = ∫ 1/R dl,   K1 = ∫ v·w/R³ dl,   K2 = ∫ |v|/R² dl.
 

@@ -1,6 +1,6 @@
-"""Danger thresholds of a robot: those of its file, or the source's carried over to it by a rule.
+"""Danger thresholds of a robot: those of its file, or the paper's carried over to it by a rule.
 
-The field sums over the links of the wire, so the same distance means another danger on another robot. The source tuned
+The field sums over the links of the wire, so the same distance means another danger on another robot. The paper tuned
 Δ = 11.5 and Δ_f = 7.5 on the IRB 140. The rule: at rest at home, a point `REFERENCE_DISTANCE` in front of a tool must
 stand in the same relation to the thresholds as it does there,
 

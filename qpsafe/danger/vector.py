@@ -1,4 +1,4 @@
-"""The danger field as a vector, eq. (6) of the source."""
+"""The danger field as a vector, eq. (6) of the paper."""
 
 from __future__ import annotations
 

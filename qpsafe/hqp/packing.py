@@ -46,7 +46,14 @@ def pack(
     upper: ArrayLike | None,
     rows: tuple[ArrayLike, ArrayLike, ArrayLike] | None,
 ) -> Packed:
-    """Copy the problem into arrays: whole lists at once where all is plain, through `as_levels` where it is not."""
+    """Copy the problem into arrays: whole lists at once where all is plain, through `as_levels` where it is not.
+
+    Args:
+        levels: As for `solve_hierarchy`.
+        lower: (n,) [rad/s], or None.
+        upper: (n,) [rad/s], or None.
+        rows: Hard rows (G, lower, upper), or None.
+    """
     if type(levels) is not list:
         levels = list(levels)
     hard = None if rows is None else Level(*rows)

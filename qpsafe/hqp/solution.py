@@ -61,7 +61,18 @@ class Solution:
         pressing: Index | None = None,
         note: str = "",
     ) -> None:
-        """Store the result; `pressing` is (n + rows,) as in `own_hierarchy.run`; `problem` may be built when needed."""
+        """Store the result.
+
+        Args:
+            qd: As above.
+            status: As above.
+            iterations: As above.
+            solver: As above.
+            solve_time: As above [s].
+            problem: What was solved; may be built when needed.
+            pressing: Where limits are pressed against, (n + rows,), as `qpsafe.hqp.own.hierarchy.run` tells.
+            note: As above.
+        """
         self.qd = qd
         self.status = status
         self.iterations = iterations

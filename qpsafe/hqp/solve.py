@@ -116,7 +116,13 @@ def _own(problem: Packed, begin: float, damping: Array | None = None, note: str 
 
 
 def note_of(status: str, where: int, problem: Packed) -> str:
-    """Where a status other than the good ones comes from."""
+    """Where a status other than the good ones comes from.
+
+    Args:
+        status: Any but the good ones.
+        where: The row or the level concerned.
+        problem: What was to be solved.
+    """
     return f"row {where}" if status == INEXACT else _name(problem, where)
 
 

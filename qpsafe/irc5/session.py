@@ -102,7 +102,13 @@ class EgmSession:
         return self.inbox.sender
 
     def offer(self, data: bytes, sender: Sender, now: float) -> bool:
-        """Take in a datagram; `now` is a monotonic clock [s]. Returns whether it is the newest packet of the robot."""
+        """Take in a datagram; `now` is a monotonic clock [s]. Returns whether it is the newest packet of the robot.
+
+        Args:
+            data: As received.
+            sender: Its address.
+            now: Monotonic clock [s].
+        """
         self._now = now
         arrival = self.inbox.offer(data, sender, now)
         if arrival is None:

@@ -22,7 +22,13 @@ def session_limits(controller: SafetyController) -> JointLimits:
 
 
 def warm_up(controller: SafetyController, blind: bool, ticks: int = 300) -> None:
-    """Run controller and session on a pretended robot through all regimes, then make the controller as new."""
+    """Run controller and session on a pretended robot through all regimes, then make the controller as new.
+
+    Args:
+        controller: Left as new.
+        blind: Whether it will run without distances.
+        ticks: How many.
+    """
     axes = axes_of_robot(controller.robot)
     session = EgmSession(session_limits(controller), joint_names=controller.robot.joint_names, axes=axes)
     q, count = controller.robot.home, 0 if controller.spots is None else len(controller.spots)

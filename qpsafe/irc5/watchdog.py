@@ -119,7 +119,14 @@ class Watchdog:
 
 
 def watch(descriptor: int, parent: int, limit: float, grace: float) -> int:
-    """The watchdog's process: returns its exit code when the loop's process is gone or was killed."""
+    """The watchdog's process: returns its exit code when the loop's process is gone or was killed.
+
+    Args:
+        descriptor: Of the file that holds the page of times.
+        parent: The loop's process.
+        limit: Age of its last heartbeat at which it is asked to stop [s].
+        grace: Further time until it is killed [s].
+    """
     page = mmap.mmap(descriptor, _PAGE)
     places = memoryview(page).cast("Q")
     while os.getppid() == parent:

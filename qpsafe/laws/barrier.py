@@ -1,4 +1,4 @@
-"""A cap on the danger field, beyond the source: CDF <= Δ_max as a soft level, and an exact speed scaling as last guard.
+"""A cap on the danger field, beyond the paper: CDF <= Δ_max as a soft level, and an exact speed scaling as last guard.
 
 At fixed q and p, CDF(q̇) = k1 S + k2 H(q̇), where H is convex and positively homogeneous in q̇ (math section 2). The
 person's own motion is not in it: the cap holds for what the robot adds.
@@ -19,6 +19,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
 
@@ -65,6 +66,9 @@ class DangerBarrier(Fixed):
         self.delta_max, self.horizon, self.points = float(delta_max), float(horizon), int(points)
         self.field = DangerField() if field is None else field
 
+    def __repr__(self) -> str:
+        return call(self, self.delta_max, horizon=self.horizon, points=self.points)
+
     def level(self, state: RobotState, qd: Array, points: Array, danger: Array) -> Level | None:
         """The soft level  k1 (S + τ ∂S/∂q q̇) + k2 ∂H/∂q̇ q̇ <= Δ_max  for the most dangerous points.
 
@@ -106,7 +110,13 @@ class DangerBarrier(Fixed):
         return result
 
     def kinetic_gradient(self, state: RobotState, qd: Array, points: Array) -> Array:
-        """∂(k2 H)/∂q̇ at p points, (p, n): Σ over links ∂(k2 H)/∂v_i J_i of both ends; 0 at rest, where H has a kink."""
+        """∂(k2 H)/∂q̇ at p points, (p, n): Σ over links ∂(k2 H)/∂v_i J_i of both ends; 0 at rest, where H has a kink.
+
+        Args:
+            state: Where the robot is.
+            qd: Its joint velocity (n,) [rad/s].
+            points: (p, 3) [m].
+        """
         if np.abs(qd).max() < _REST:
             return np.zeros((len(points), len(qd)))
         wire, (starts, stops), J = state.wire(qd), state.robot.wire_indices, state.wire_jacobians()

@@ -1,4 +1,4 @@
-"""How far a law is from the source's, eqs. (18) and (22), over random states: the first half of `qpsafe compare`."""
+"""How far a law is from the paper's, eqs. (18) and (22), over random states: the first half of `qpsafe compare`."""
 
 from __future__ import annotations
 

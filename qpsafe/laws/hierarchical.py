@@ -21,6 +21,7 @@ from qpsafe.hqp.solve import STATUS, note_of, solve_hierarchy
 from qpsafe.laws.damping import DAMPING_TIME, threshold
 from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
+from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
 
@@ -81,6 +82,10 @@ class HierarchicalLaw(Fixed):
             import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
         self.damping, self.damping_time = float(damping), float(damping_time)
 
+    def __repr__(self) -> str:
+        given = {"solver": self.solver} if self.solver is not None else {}
+        return call(self, self.projection, **given, damping=self.damping, damping_time=self.damping_time)
+
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
         qd = np.zeros(len(problem.qd0))
@@ -105,7 +110,7 @@ class HierarchicalLaw(Fixed):
         else:
             tasks = problem.tasks[:1]
             J_1, xd_1 = tasks[0]
-            # what the source adds below the first task; its part in the range of P(J_1) is overruled by level 1
+            # what the paper adds below the first task; its part in the range of P(J_1) is overruled by level 1
             target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
             levels = [*problem.soft, (J_1, xd_1), (identity, target)]
         damping, square = [0.0] * len(levels), self.damping**2

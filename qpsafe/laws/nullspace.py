@@ -1,4 +1,4 @@
-"""The source's law by pseudoinverses and null-space projections, eqs. (17), (18), (20), (22). It knows no limits."""
+"""The paper's law by pseudoinverses and null-space projections, eqs. (17), (18), (20), (22). It knows no limits."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
 from qpsafe.laws.problem import LawProblem, LawResult
+from qpsafe.text.words import call
 
 #: Singular values below this fraction of the largest count as zero, here and in the QP solvers.
 RANK_TOLERANCE = 1e-10
@@ -68,10 +69,13 @@ def paper_regime(problem: LawProblem, kept: int) -> NDArray[np.float64]:
 
 
 class NullspaceLaw:
-    """The law of the source: (18) for one task, (22) for two, the same blend of pure regimes for more.
+    """The law of the paper: (18) for one task, (22) for two, the same blend of pure regimes for more.
 
     It takes no notice of limits; the controller clips what it returns.
     """
+
+    def __repr__(self) -> str:
+        return call(self)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Evaluate the law for one tick; see `LawProblem` for shapes."""

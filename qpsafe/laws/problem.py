@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.text.words import call
+
 if TYPE_CHECKING:
     from qpsafe.hqp.level import Level
     from qpsafe.hqp.solution import Solution
@@ -60,6 +62,9 @@ class LawResult:
     qd: NDArray[np.float64]
     status: str = "solved"
     regimes: tuple[tuple[float, Solution], ...] = ()
+
+    def __repr__(self) -> str:
+        return call(self, self.qd, self.status, weights=tuple([round(weight, 4) for weight, _ in self.regimes]))
 
 
 class Law(Protocol):

@@ -12,7 +12,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
-from qpsafe.text.words import counted
+from qpsafe.text.words import call, counted
 
 
 class WeightedLaw(Fixed):
@@ -42,6 +42,10 @@ class WeightedLaw(Fixed):
         self.solver = solver
         if solver in (None, "own"):
             import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
+
+    def __repr__(self) -> str:
+        given = {"ratio": self.ratio} if self.weights is None else {"weights": self.weights}
+        return call(self, **given, solver=self.solver)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""

@@ -34,7 +34,7 @@ LONGEST_TICK = 0.1
 
 
 def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
-    """The robot's thresholds (the IRB 140's are the source's): (18) for one task, (22) for two."""
+    """The robot's thresholds (the IRB 140's are the paper's): (18) for one task, (22) for two."""
     if len(tasks) <= 2:
         return Activation(robot_thresholds(robot)[: len(tasks)])
     raise ConfigurationError(
@@ -43,7 +43,13 @@ def default_activation(tasks: tuple[Task, ...], robot: Robot) -> Activation:
 
 
 def checked_activation(tasks: tuple[Task, ...], activation: Activation | None, robot: Robot) -> Activation:
-    """The given activation, or the default one, if it has as many thresholds as there are tasks."""
+    """The given activation, or the default one, if it has as many thresholds as there are tasks.
+
+    Args:
+        tasks: Highest priority first.
+        activation: As given; None for the robot's.
+        robot: Whose thresholds are the default.
+    """
     activation = default_activation(tasks, robot) if activation is None else activation
     if not isinstance(activation, Activation):
         raise ConfigurationError("SafetyController", "activation", activation, "an Activation")
@@ -61,8 +67,14 @@ def checked_dt(where: str, dt: float) -> float:
     return float(dt)
 
 
-def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
-    """Refuse tasks that the robot cannot do."""
+def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> tuple[str, ...]:
+    """What reports call the tasks; those that the robot cannot do are refused.
+
+    Args:
+        robot: Who has to do them.
+        tasks: As given.
+        dt: Tick [s]; K dt has to be below 1.
+    """
     if not (isinstance(tasks, Sequence) and len(tasks) > 0):
         raise ConfigurationError("SafetyController", "tasks", tasks, "a list of at least one task")
     for k, task in enumerate(tasks):
@@ -74,6 +86,7 @@ def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> None:
         if not task.gain * dt < 1.0:
             expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
             raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)
+    return tuple(task.label for task in tasks)
 
 
 def checked_robot(where: str, robot: Robot) -> Robot:
@@ -98,7 +111,13 @@ def checked_field(field: Any) -> Any:
 
 
 def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:
-    """`evasion`, if it is one of this robot and this tick."""
+    """`evasion`, if it is one of this robot and this tick.
+
+    Args:
+        evasion: As given.
+        robot: Whose joints move.
+        dt: Tick [s].
+    """
     if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
         raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {counted(robot.nq, 'joint')}")
     if evasion.dt != dt:
@@ -135,7 +154,13 @@ def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
 
 
 def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
-    """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be."""
+    """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be.
+
+    Args:
+        result: The law's answer.
+        q: Commanded joint position (n,) [rad].
+        dt: Tick [s].
+    """
     if not isinstance(result, LawResult):
         raise TypeError(f"the law returned {type(result).__name__}, expected a LawResult")
     qd = result.qd

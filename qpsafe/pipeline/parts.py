@@ -5,8 +5,9 @@ A part never changes, see `qpsafe.fixed`; another one may take its place, and co
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
@@ -25,6 +26,7 @@ from qpsafe.recovery.recovery import Recovery, RecoveryRules
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sensing.spots import SpotArray
+from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -42,6 +44,7 @@ class Parts:
     _robot: Robot
     _dt: float
     _tasks: tuple[Task, ...]
+    _labels: tuple[str, ...]
     _law: Law
     _field: Any
     _activation: Activation
@@ -54,6 +57,9 @@ class Parts:
     _barrier: DangerBarrier | None
     _recovery_rules: RecoveryRules
     _recovery: Recovery
+
+    def __repr__(self) -> str:
+        return call(self, self._robot.name, self._labels, self._law, dt=self._dt, phase=self._recovery.phase)
 
     @property
     def robot(self) -> Robot:
@@ -169,12 +175,17 @@ class Parts:
         Raises:
             ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
         """
-        check_tasks(self._robot, tasks, self._dt)
+        labels = check_tasks(self._robot, tasks, self._dt)
         if activation is None and len(tasks) == len(self._tasks):
             activation = self._activation
         activation = checked_activation(tuple(tasks), activation, self._robot)
         self._recovery.set_tasks(tuple(tasks), activation.suspend_above, restart)
-        self._tasks, self._activation = tuple(tasks), activation
+        self._tasks, self._labels, self._activation = tuple(tasks), labels, activation
+
+    def __copy__(self) -> Self:
+        """A run of its own that goes on from here, as a deep copy is; parts that do not change are shared."""
+        shared = (self._robot, *self._tasks, self._law, self._field, self._activation, self._spots, self._rules)
+        return copy.deepcopy(self, {id(part): part for part in shared})
 
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""

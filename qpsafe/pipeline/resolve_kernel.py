@@ -53,7 +53,15 @@ class Parts(NamedTuple):
 
 
 def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tuple[Any, ...]:
-    """Cut `Parts` from two blocks."""
+    """Cut `Parts` from two blocks.
+
+    Args:
+        floats: `sizes_of` says how many.
+        integers: The same.
+        n: Joints.
+        rows: Of all tasks.
+        kinds: Regimes.
+    """
     a = rows * n
     b = a + 2 * rows
     c = b + kinds * n
@@ -70,14 +78,27 @@ def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tupl
 
 
 def sizes_of(n: int, rows: int, kinds: int) -> tuple[int, int]:
-    """How many floats and integers these are."""
+    """How many floats and integers these are.
+
+    Args:
+        n: Joints.
+        rows: Of all tasks.
+        kinds: Regimes.
+    """
     return rows * n + 2 * rows + (3 + kinds) * n, 3 * n + kinds * (HEADER + 2 * n + rows)
 
 
 def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
-    """Cut from a block what changes every tick: gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals
-    (tasks, 4, 4); twists (tasks, 6); weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in
-    by the call; q̇0 (n,)."""
+    """Cut from a block what changes every tick.
+
+    These are gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals (tasks, 4, 4); twists (tasks, 6);
+    weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in by the call; q̇0 (n,).
+
+    Args:
+        block: The floats.
+        n: Joints.
+        tasks: How many.
+    """
     return (
         view(block, 0, (tasks,)),
         view(block, tasks, (tasks,)),

@@ -36,7 +36,13 @@ class Stages:
         return Stages, (self._robot, self._dt)
 
     def sense(self, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> Sense:
-        """From measurements to q̇0."""
+        """From measurements to q̇0.
+
+        Args:
+            sensing: Distance sensors; None if there are only points.
+            field: The danger field.
+            evasion: The admittance (16).
+        """
         made = self._sense
         if made is None or not (made.parts[0] is sensing and made.parts[1] is field and made.parts[2] is evasion):
             made = self._sense = Sense(self._robot, sensing, field, evasion)

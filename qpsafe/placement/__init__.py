@@ -1,1 +1,1 @@
-"""Where to put the distance sensors: section III of the source."""
+"""Where to put the distance sensors: section III of the paper."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: How many candidates the source has on its IRB 140.
+#: How many candidates the paper has on its IRB 140.
 SOURCE_NODES = 254
 COARSE = 0.015  # lattice that measures a region [m]
 FINE = 5.0  # the lattice that fills gaps is finer than the grid by this

@@ -156,7 +156,14 @@ def _gains(begin: Array, case: Array, v: Array, best: Array, gains: Array) -> No
 
 
 def progress_of(nodes: int, node: NDArray[np.int32], worth: Worth, order: NDArray[np.intp]) -> Array:
-    """f of the first 0, 1, ... nodes of an order, (k + 1,); arguments as for `greedy`."""
+    """f of the first 0, 1, ... nodes of an order, (k + 1,); arguments as for `greedy`.
+
+    Args:
+        nodes: How many there are.
+        node: Node of every detection.
+        worth: What detections are worth.
+        order: Nodes (k,), first chosen first.
+    """
     rank = np.full(nodes, len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     # case by case, in the order of the nodes: every new largest value adds its excess over the last one

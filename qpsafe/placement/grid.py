@@ -88,6 +88,12 @@ def looks_out(points: Array, normals: Array, body: Array, reach: float) -> NDArr
     """Which points (k, 3) see nothing of their own body (t, 3, 3) along their normals within `reach` [m].
 
     A point inside another part of the body sees that part's far side, so buried points are out too.
+
+    Args:
+        points: (k, 3) [m].
+        normals: Outwards (k, 3).
+        body: Triangles (t, 3, 3) [m].
+        reach: [m].
     """
     free = np.empty(len(points), dtype=np.bool_)
     _looks_out(points, normals, body, reach, free)
@@ -112,7 +118,13 @@ def _looks_out(points: Array, normals: Array, body: Array, reach: float, free: N
 
 
 def thin_out(points: Array, normals: Array, nearest: float) -> NDArray[np.intp]:
-    """The points to keep, in order: none nearer than `nearest` [m] to an earlier one that looks the same way."""
+    """The points to keep, in order: none nearer than `nearest` [m] to an earlier one that looks the same way.
+
+    Args:
+        points: (k, 3) [m].
+        normals: Outwards (k, 3).
+        nearest: [m].
+    """
     kept = np.empty(len(points), dtype=np.int64)
     count = np.zeros(1, dtype=np.int64)
     _thin_out(points, normals, nearest, kept, count)

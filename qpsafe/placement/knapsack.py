@@ -44,6 +44,11 @@ def cost(sample: Sample, order: NDArray[np.intp]) -> tuple[Array, Array]:
 def check_spots(spots: int, nodes: int, caps: Caps | None = None) -> None:
     """Refuse a number of spots that cannot be placed.
 
+    Args:
+        spots: How many are wanted.
+        nodes: How many there are.
+        caps: How many a group of nodes may have.
+
     Raises:
         ConfigurationError: Below 1, or more than there are nodes or caps allow.
     """

@@ -19,6 +19,11 @@ class Objective(StrEnum):
 def check_request(nodes: int, spots: int | None, probability: float | None) -> None:
     """Refuse what cannot be asked.
 
+    Args:
+        nodes: How many there are.
+        spots: How many are wanted, or None.
+        probability: Detection probability wanted, or None.
+
     Raises:
         ConfigurationError: No spots, more spots than nodes, a probability that is none, or both given.
     """

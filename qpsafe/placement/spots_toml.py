@@ -45,7 +45,14 @@ def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> st
 
 
 def write_spots(path: Path, candidates: Candidates, chosen: Sequence[int], remark: str) -> None:
-    """Write `spots_toml` whole or not at all."""
+    """Write `spots_toml` whole or not at all.
+
+    Args:
+        path: The file.
+        candidates: All nodes.
+        chosen: Which of them carry a spot.
+        remark: First comment in the file.
+    """
     part = path.with_name("." + path.name + ".part")
     try:
         part.write_text(spots_toml(candidates, chosen, remark), encoding="utf-8")

@@ -64,7 +64,13 @@ def link_surface(robot: Robot, region: Region) -> Surface:
 
 
 def model_body(model: Any, robot: Robot, frame: str) -> int:
-    """MuJoCo's number of the body that a frame is fixed to: the body of the joint that moves it, else the base."""
+    """MuJoCo's number of the body that a frame is fixed to: the body of the joint that moves it, else the base.
+
+    Args:
+        model: MuJoCo's.
+        robot: Of that model.
+        frame: One of the robot's.
+    """
     joint = robot.model.frames[robot.frame_id(frame)].parentJoint
     if joint > 0:
         return int(model.jnt_bodyid[model.joint(robot.model.names[joint]).id])

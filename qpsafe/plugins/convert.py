@@ -87,7 +87,16 @@ def task_velocity(task: Any, configuration: Any, dt: float, joints: JointMap | N
 
 
 def pose_task(robot: Robot, frame: str, target: Array, gain: float, cost: Array, dt: float) -> Task:
-    """A mink or pink `FrameTask` as `FrameTask`: rows of zero cost left out, the others times their cost."""
+    """A mink or pink `FrameTask` as `FrameTask`: rows of zero cost left out, the others times their cost.
+
+    Args:
+        robot: Whose frame it is.
+        frame: Its name.
+        target: Pose (4, 4) [m].
+        gain: Theirs, the part α of the error removed per step.
+        cost: Of the six rows, (6,).
+        dt: Step [s]; K = α/dt.
+    """
     rows = np.flatnonzero(cost > 0.0)
     if len(rows) == 0:
         raise ConfigurationError("FrameTask", "cost", cost, "at least one row that costs something")
@@ -99,7 +108,14 @@ def pose_task(robot: Robot, frame: str, target: Array, gain: float, cost: Array,
 
 
 def posture_task(posture: Array, gain: float, cost: Array, dt: float) -> Task:
-    """A mink or pink `PostureTask` as `PostureTask`, or as `JointTask` where some joints cost nothing."""
+    """A mink or pink `PostureTask` as `PostureTask`, or as `JointTask` where some joints cost nothing.
+
+    Args:
+        posture: Joint positions (n,) [rad].
+        gain: Theirs, the part α of the error removed per step.
+        cost: Of the joints, (n,).
+        dt: Step [s]; K = α/dt.
+    """
     joints = np.flatnonzero(cost > 0.0)
     if len(joints) == 0:
         raise ConfigurationError("PostureTask", "cost", cost, "at least one joint that costs something")

@@ -61,6 +61,11 @@ def mujoco_joints(model: Any, robot: Robot, prefix: str = "") -> JointMap:
 def pinocchio_joints(model: Any, robot: Robot, prefix: str = "") -> JointMap:
     """The robot's joints in a pinocchio model, by name; arguments as for `mujoco_joints`.
 
+    Args:
+        model: pinocchio's.
+        robot: Whose joints are looked for.
+        prefix: Before their names in the model.
+
     Raises:
         ConfigurationError: A joint is missing, or is not described by one number (a continuous joint).
     """

@@ -38,7 +38,7 @@ class DangerMonitor:
     Args:
         robot: The robot whose wire makes the field.
         dt: Tick [s], the same as given to `solve_ik`.
-        field: The danger field; the source's weights by default.
+        field: The danger field; the paper's weights by default.
         activation: Thresholds, the highest priority's first; the robot's two by default.
         evasion: The admittance (16).
         limits: Joint limits, by default the robot's; "off" for none.

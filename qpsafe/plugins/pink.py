@@ -29,6 +29,12 @@ class EvasiveTask(EvasiveRows, PinkTask):  # type: ignore[misc]
     """Moves the robot away from danger: Δq = q̇0 dt, eq. (16), at a cost that grows with the danger.
 
     As `qpsafe.plugins.mink.EvasiveTask`, with the same arguments.
+
+    Args:
+        danger: What is near the robot; update it before each `solve_ik`.
+        cost: c, its cost without danger, a number or (n,) [cost/rad]. Small against the other tasks' costs.
+        against: C, about what the tasks cost that are to give way.
+        prefix: What stands before the joints' names in the model.
     """
 
     def __init__(self, danger: DangerMonitor, cost: ArrayLike = 0.03, against: float = 1.0, prefix: str = "") -> None:
@@ -47,6 +53,13 @@ class ClikTask(ClikRows, PinkTask):  # type: ignore[misc]
     """One of qpsafe's tasks as pink's, the same rows exactly: J Δq = (ẋ_d + K e) dt.
 
     As `qpsafe.plugins.mink.ClikTask`, with the same arguments.
+
+    Args:
+        task: The task; set `time` to where its trajectory is.
+        robot: The robot it is for.
+        dt: Tick [s], as given to `solve_ik`.
+        cost: A number, or one for every row.
+        prefix: What stands before the joints' names in the model.
     """
 
     def __init__(self, task: Task, robot: Robot, dt: float, cost: ArrayLike = 1.0, prefix: str = "") -> None:
@@ -66,6 +79,11 @@ class ReleasableTask(PinkTask):  # type: ignore[misc]
     """One of pink's tasks, released in danger before the first one, as Table I releases the low-priority task.
 
     As `qpsafe.plugins.mink.ReleasableTask`, with the same arguments.
+
+    Args:
+        task: Any of pink's tasks.
+        danger: What is near the robot.
+        priority: 2 for the task that is released first of two, up to the number of the danger's thresholds.
     """
 
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
@@ -97,6 +115,13 @@ class DangerLimit(DangerRows, PinkLimit):  # type: ignore[misc]
     """A cap on the danger field at the detected points: CDF(q, q̇, p) <= Δ_max.
 
     As `qpsafe.plugins.mink.DangerLimit`, with the same arguments.
+
+    Args:
+        danger: What is near the robot; update it before each `solve_ik`.
+        delta_max: Δ_max [unit of CDF].
+        horizon: τ, how far ahead the static field is predicted [s].
+        points: How many of the most dangerous points get a row.
+        prefix: What stands before the joints' names in the model.
     """
 
     def __init__(

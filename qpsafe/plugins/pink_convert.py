@@ -23,6 +23,13 @@ __all__ = ["from_pink", "to_pink"]
 def from_pink(task: Any, robot: Robot, model: Any, dt: float, prefix: str = "") -> Task:
     """One of pink's tasks as qpsafe's; as `qpsafe.plugins.mink_convert.from_mink`, with a pinocchio model.
 
+    Args:
+        task: One of pink's.
+        robot: Whose task it becomes.
+        model: pinocchio's.
+        dt: Step [s].
+        prefix: Before the joints' names in the model.
+
     Raises:
         ConfigurationError: A kind of task, frame, cost or damping that has no counterpart.
     """
@@ -50,6 +57,14 @@ def to_pink(task: Task, robot: Robot, model: Any, dt: float, cost: float = 1.0, 
 
     All joints of the model that are to stay in a posture, at one cost, become pink's own `PostureTask`, all else a
     `ClikTask`. Arguments and errors as for `qpsafe.plugins.mink_convert.to_mink`, with a pinocchio model.
+
+    Args:
+        task: One of qpsafe's.
+        robot: Whose task it is.
+        model: pinocchio's.
+        dt: Step [s].
+        cost: Of every row.
+        prefix: Before the joints' names in the model.
     """
     inner, own_cost = unpriced(task)
     result = ClikTask(inner, robot, dt, cost * np.asarray(own_cost), prefix)

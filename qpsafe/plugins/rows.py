@@ -58,7 +58,7 @@ class EvasiveRows(OnRobot):
     """Δq = q̇0 dt, with a cost that grows as the tasks' release proceeds: cost² = c² + C² (1-m)/m.
 
     Of two wishes with the weights w and w (1-m)/m the compromise is m times the first and (1-m) times the second: the
-    source's blend (18), if C is about what the tasks cost that are to be released. With C = c the cost is c/sqrt(m),
+    paper's blend (18), if C is about what the tasks cost that are to be released. With C = c the cost is c/sqrt(m),
     and a call of `solve_ik` is `WeightedLaw`, whose weights m w and w_E are divided by m.
     """
 
@@ -67,7 +67,14 @@ class EvasiveRows(OnRobot):
     _calm_cost: Array
 
     def set_up(self, danger: DangerMonitor, cost: ArrayLike, against: float, prefix: str) -> None:
-        """Check and keep the arguments of the constructor."""
+        """Check and keep the arguments of the constructor.
+
+        Args:
+            danger: What is near the robot.
+            cost: Without danger, a number or (n,).
+            against: About what the tasks cost that are to give way.
+            prefix: What stands before the joints' names in the model.
+        """
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("EvasiveTask", "danger", danger, "a DangerMonitor")
         if not (math.isfinite(against) and against >= 0.0):
@@ -109,7 +116,14 @@ class ClikRows(OnRobot):
     time: float
 
     def set_up(self, task: Task, robot: Robot, dt: float, prefix: str) -> None:
-        """Check and keep the arguments of the constructor."""
+        """Check and keep the arguments of the constructor.
+
+        Args:
+            task: One of qpsafe's.
+            robot: The robot it is for.
+            dt: Tick [s].
+            prefix: What stands before the joints' names in the model.
+        """
         misfit = task.misfit(robot)
         if misfit is not None:
             raise ConfigurationError(type(task).__name__, misfit.key, misfit.value, misfit.expected)
@@ -143,7 +157,15 @@ class DangerRows(OnRobot):
     barrier: DangerBarrier
 
     def set_up(self, danger: DangerMonitor, delta_max: float, horizon: float, points: int, prefix: str) -> None:
-        """Check and keep the arguments of the constructor."""
+        """Check and keep the arguments of the constructor.
+
+        Args:
+            danger: What is near the robot.
+            delta_max: Δ_max.
+            horizon: τ [s].
+            points: How many of the most dangerous points get a row.
+            prefix: What stands before the joints' names in the model.
+        """
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("DangerLimit", "danger", danger, "a DangerMonitor")
         self.danger, self.robot, self.prefix = danger, danger.robot, prefix
@@ -207,7 +229,13 @@ def updated(danger: DangerMonitor) -> DangerMonitor:
 
 
 def same_tick(danger: DangerMonitor, dt: float, where: str) -> DangerMonitor:
-    """The monitor, if it has the tick that `solve_ik` was called with."""
+    """The monitor, if it has the tick that `solve_ik` was called with.
+
+    Args:
+        danger: The monitor.
+        dt: That tick [s].
+        where: Who asks, for the error.
+    """
     if not math.isclose(dt, danger.dt, rel_tol=1e-9):
         raise ConfigurationError(where, "dt", dt, f"the tick of its DangerMonitor, {danger.dt} s")
     return danger
@@ -219,7 +247,13 @@ def release(danger: DangerMonitor, priority: int) -> float:
 
 
 def checked_cost(where: str, cost: ArrayLike, rows: int) -> Array:
-    """A cost for every row (rows,), from one number or as many."""
+    """A cost for every row (rows,), from one number or as many.
+
+    Args:
+        where: Who asks, for the error.
+        cost: As given.
+        rows: How many there are.
+    """
     expected = f"a finite number >= 0, or {rows} of them"
     try:
         array = np.array(cost, dtype=float)

@@ -6,7 +6,13 @@ from typing import Any
 
 
 class Cursor:
-    """Which event of a trajectory comes next; it only ever moves forward."""
+    """Which event of a trajectory comes next; it only ever moves forward.
+
+    Args:
+        trajectory: Whatever it follows; may have no events.
+        time: On the path, from where on events count [s].
+        passed: Events (time, name) that have been; added to.
+    """
 
     def __init__(self, trajectory: Any, time: float, passed: set[tuple[float, str]]) -> None:
         self.trajectory = trajectory

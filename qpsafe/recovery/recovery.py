@@ -1,4 +1,4 @@
-"""Suspension and recovery of the tasks' path, section IV-C of the source, as one small state machine.
+"""Suspension and recovery of the tasks' path, section IV-C of the paper, as one small state machine.
 
 following ──danger above Δ(1-ε)──> suspended ──danger below──> recovering ──back at x_d,s──> following
                                         ^────────danger above────────┘

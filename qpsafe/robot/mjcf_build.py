@@ -113,6 +113,12 @@ def build_model(compiled: Compiled, held: Mapping[str, float]) -> Built:
 def check_same(path: Any, compiled: Compiled, built: Built, held: Mapping[str, float]) -> None:
     """Compare ranges, bodies, sites and inertia with MuJoCo's, in three random configurations.
 
+    Args:
+        path: The model file, for the error.
+        compiled: By MuJoCo.
+        built: By us.
+        held: Joints that are held, and where.
+
     Raises:
         RobotFileError: Names the first that differs.
     """

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 
 def unique_name(name: str, kind: str, taken: set[str]) -> str:
-    """`name`, or "name (kind)" where that is taken; the result is taken then."""
+    """`name`, or "name (kind)" where that is taken; the result is taken then.
+
+    Args:
+        name: As wished.
+        kind: What bears it, e.g. ``joint``.
+        taken: Names that are; the result is added.
+    """
     unique, number = name, 1
     while unique in taken:
         unique = f"{name} ({kind})" if number == 1 else f"{name} ({kind} {number})"

@@ -252,7 +252,13 @@ def _check_region(path: Path, key: str, region: RegionTable, file: RobotFile) ->
 
 
 def table_key(name: str, i: int, count: int) -> str:
-    """How a person finds table i of several, or the only one."""
+    """How a person finds table i of several, or the only one.
+
+    Args:
+        name: Of the tables.
+        i: From 0.
+        count: How many there are.
+    """
     return name if count == 1 else f"{name}[{i}]"
 
 

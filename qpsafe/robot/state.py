@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.robot.kinematics import Tree, forward, jacobian_of, pose_of, wire_of
 from qpsafe.robot.wire import Wire
+from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,9 @@ class RobotState:
         self.q = q
         self.memory = np.empty(robot.memory)
         forward(q, *robot.tree, self.memory)
+
+    def __repr__(self) -> str:
+        return call(self, getattr(self.robot, "name", self.robot), self.q)
 
     def body_poses(self) -> Array:
         """Poses in the world of all moving bodies, body i moved by joint i (from 1); 0 is the world, (n + 1, 4, 4)."""

@@ -36,6 +36,11 @@ def body_hull_set(robot: Robot) -> HullSet:
 def fixed_to(robot: Robot, frame: str, thing: Obstacle) -> BodyHull:
     """A thing that moves with a frame of the robot, given in the frame's axes, e.g. a workpiece in its gripper.
 
+    Args:
+        robot: The robot.
+        frame: One of its frames.
+        thing: Its hull, in the frame's axes.
+
     Raises:
         ConfigurationError: The robot has no such frame.
     """

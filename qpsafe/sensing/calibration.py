@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 #: The file in the robot's folder that `load_calibration` reads.
 FILE_NAME = "calibration.toml"
-#: Range of distances that is fitted, the source's [m].
+#: Range of distances that is fitted, the paper's [m].
 FITTED = (0.20, 0.80)
 FEWEST = 6  # pairs a spot: twice the number of parameters
 #: Farther off the curve than this, and than this many robust standard deviations of the others, a pair is wrong [m].
@@ -85,6 +85,11 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
     The loss is robust (soft L1 with a scale of 1 cm in distance), and up to a tenth of the pairs that are then plainly
     wrong are left out of a second fit: they do not spoil the curve. Voltages are weighted by the slope of the curve, so
     that errors in distance count, not in voltage.
+
+    Args:
+        spot: Its name, for errors.
+        distances: (pairs,) [m].
+        voltages: (pairs,) [V].
 
     Raises:
         ConfigurationError: Too few pairs, numbers that are not finite, or pairs that are no falling curve.

@@ -74,6 +74,11 @@ def _all_between(lowest: Array, array: Array, highest: Array) -> bool:
 def refuse(q: ArrayLike, qd: ArrayLike, robot: Robot) -> NoReturn:
     """Say what is wrong with a measurement that compiled code refused.
 
+    Args:
+        q: Joint position, as given.
+        qd: Joint velocity, as given.
+        robot: Whose measurement it is.
+
     Raises:
         BadInput: Always.
     """

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.words import call
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,9 @@ class Obstacle:
 
     def __post_init__(self) -> None:
         half_spaces(self.name, self.vertices)
+
+    def __repr__(self) -> str:
+        return call(self, self.name, lowest=self.vertices.min(axis=0), highest=self.vertices.max(axis=0))
 
     @classmethod
     def box(cls, name: str, size: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0), pose: ArrayLike = ()) -> Obstacle:

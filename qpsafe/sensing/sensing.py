@@ -69,6 +69,12 @@ def check_surroundings(
 ) -> None:
     """Refuse what a `SafetyController` cannot sense with, by name.
 
+    Args:
+        robot: Whose surroundings these are.
+        rules: As given.
+        known: As given.
+        carried: As given.
+
     Raises:
         ConfigurationError: Rules, an obstacle or a frame that is none.
     """

@@ -1,7 +1,7 @@
 """The Sharp GP2Y0A02YK infra-red distance sensor: its curve, and how voltages become distances again.
 
 The sensor measures by triangulation. Beyond a peak near 15 cm its voltage falls with the distance like a/(d + b) + c;
-nearer than that it falls again towards the surface, so that one voltage has two distances. The source uses 20 to 80 cm:
+nearer than that it falls again towards the surface, so that one voltage has two distances. The paper uses 20 to 80 cm:
 nearer is ambiguous, farther is noise.
 """
 

@@ -22,6 +22,12 @@ def slowed(qd: NDArray[np.float64], state: RobotState, cap: float, box: Box | No
     """The velocity qd (n,) [rad/s], scaled so that no point of the wire is faster than `cap` [m/s].
 
     The direction of the motion is kept. A robot that is faster now brakes as hard as the box of its limits allows.
+
+    Args:
+        qd: As wished (n,) [rad/s].
+        state: Where the robot is.
+        cap: [m/s].
+        box: Of the limits; None without.
     """
     speed = wire_speed(qd, state)
     if speed <= cap:

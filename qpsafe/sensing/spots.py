@@ -15,6 +15,7 @@ from qpsafe.compiled.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.spot import Spot
 from qpsafe.sensing.spot_file import read_spots
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -57,6 +58,11 @@ class SpotArray:
             own = np.array(getattr(self, key))
             own.flags.writeable = False
             object.__setattr__(self, key, own)
+
+    def __repr__(self) -> str:
+        range_max = float(self.range_max.max(initial=0.0))
+        size = f"{counted(len(self), 'spot')} on {counted(len(set(self.links.tolist())), 'link')}"
+        return f"SpotArray({size}, range_max={range_max:.4g})"
 
     def __len__(self) -> int:
         return len(self.names)
@@ -164,7 +170,13 @@ class SpotArray:
 
 
 def rays_in_world(poses: Array, bodies: NDArray[np.int64], rays: Array) -> tuple[Array, Array]:
-    """Origins and directions (k, 3) of rays that are fixed in bodies with the given poses (b, 4, 4)."""
+    """Origins and directions (k, 3) of rays that are fixed in bodies with the given poses (b, 4, 4).
+
+    Args:
+        poses: (b, 4, 4) [m].
+        bodies: Which body carries each ray (k,).
+        rays: Origin and direction in its axes, as homogeneous columns (k, 4, 2) [m].
+    """
     origins, directions = np.empty((len(bodies), 3)), np.empty((len(bodies), 3))
     _rays(np.ascontiguousarray(poses), bodies, np.ascontiguousarray(rays), origins, directions)
     return origins, directions
@@ -205,7 +217,13 @@ def _rays(poses: Array, bodies: Array, rays: Array, origins: Array, directions: 
 
 
 def detected_points(origins: Array, directions: Array, distances: Array) -> Array:
-    """Eq. (7): the point (0, 0, d_k) of the spot's frame, in the world: origin + d_k times the measuring direction."""
+    """Eq. (7): the point (0, 0, d_k) of the spot's frame, in the world: origin + d_k times the measuring direction.
+
+    Args:
+        origins: (k, 3) [m].
+        directions: Unit vectors (k, 3).
+        distances: (k,) [m].
+    """
     return origins + distances[:, None] * directions
 
 

@@ -1,6 +1,6 @@
 """How fast what a spot sees comes nearer: an alpha-beta filter along each ray.
 
-The source takes obstacles as standing still. This estimate is an option. A ray that sweeps over a surface tells nothing
+The paper takes obstacles as standing still. This estimate is an option. A ray that sweeps over a surface tells nothing
 of motion along the surface, so only the part along the ray is estimated, and only an approach is passed on: a point
 that goes away is no reason to count less danger.
 """

@@ -9,7 +9,13 @@ from typing import Any
 
 
 def json_text(value: Any, indent: int | None = 2, sort_keys: bool = False) -> str:
-    """A value as JSON: numbers that are not finite become null, arrays lists, what JSON does not know text."""
+    """A value as JSON: numbers that are not finite become null, arrays lists, what JSON does not know text.
+
+    Args:
+        value: Anything.
+        indent: Spaces a level; None for one line.
+        sort_keys: Whether to sort.
+    """
     return json.dumps(plain(value), indent=indent, sort_keys=sort_keys, allow_nan=False)
 
 

@@ -73,7 +73,13 @@ class TomlText:
             raise self.wrong(keys, value, first["msg"]) from None
 
     def wrong(self, keys: Keys, value: object, expected: str) -> ConfigurationError:
-        """An error about the value of a key such as ``("segment", 2, "to")``, of the text's kind."""
+        """An error about the value of a key such as ``("segment", 2, "to")``, of the text's kind.
+
+        Args:
+            keys: Where the value is.
+            value: As found.
+            expected: Instead, in words.
+        """
         name = ""
         for key in keys:
             name += f"[{key}]" if isinstance(key, int) else f".{key}" if name else key

@@ -29,7 +29,14 @@ class ViewerUnavailableError(QpsafeError, RuntimeError):
 
 
 def overlay(tick: Tick, plant: Plant, spots: SpotArray, thresholds: tuple[float, float]) -> DangerOverlay:
-    """What to draw for one tick: all rays, the points that count and their danger vectors."""
+    """What to draw for one tick: all rays, the points that count and their danger vectors.
+
+    Args:
+        tick: The tick.
+        plant: The robot and its surroundings, as the tick found them.
+        spots: The distance sensors.
+        thresholds: From where danger is medium, and high.
+    """
     origins, directions = spots.rays(plant.scene.robot.at(plant.q))
     ends = origins + spots.range_max[:, None] * directions
     # a ray hits where it passes through a detected point
@@ -79,7 +86,13 @@ class Film:
         self._writer.__exit__(kind, error, trace)
 
     def observe(self, tick: Tick, scene: Scene, plant: Plant) -> Any:
-        """Add a frame if one is due and return it, else None."""
+        """Add a frame if one is due and return it, else None.
+
+        Args:
+            tick: The tick.
+            scene: What is filmed.
+            plant: The state of it.
+        """
         if tick.reference.seq % self._every:
             return None
         drawn = overlay(tick, plant, self._spots, self._thresholds)
@@ -96,7 +109,14 @@ class Film:
 
 
 class Viewer:
-    """Shows a run in MuJoCo's viewer in real time, with points, rays and vectors; needs a display."""
+    """Shows a run in MuJoCo's viewer in real time, with points, rays and vectors; needs a display.
+
+    Args:
+        scene: What is shown.
+        spots: The distance sensors.
+        activation: Its thresholds colour the points.
+        dt: Tick [s].
+    """
 
     def __init__(self, scene: Scene, spots: SpotArray, activation: Activation, dt: float = 0.004) -> None:
         self._scene, self._spots, self._dt = scene, spots, dt
@@ -105,6 +125,11 @@ class Viewer:
 
     def observe(self, tick: Tick, scene: Scene, plant: Plant) -> None:
         """Show the state, at most 50 times a second, and keep pace with the clock.
+
+        Args:
+            tick: The tick.
+            scene: What is shown.
+            plant: The state of it.
 
         Raises:
             ViewerUnavailableError: There is no display.

@@ -15,7 +15,13 @@ GREEN, YELLOW, RED = np.array([0.20, 0.68, 0.32]), np.array([0.98, 0.78, 0.10]),
 
 
 def danger_colour(value: float, medium: float, high: float) -> Array:
-    """Green at zero danger, yellow at the medium threshold, red from the high one on; RGB, 0 to 1, (3,)."""
+    """Green at zero danger, yellow at the medium threshold, red from the high one on; RGB, 0 to 1, (3,).
+
+    Args:
+        value: Danger; grey if it is NaN.
+        medium: Threshold of medium danger.
+        high: Threshold of high danger.
+    """
     if not value >= 0.0:
         return np.array([0.5, 0.5, 0.5])
     if value <= medium:

@@ -1,4 +1,4 @@
-"""Figures of a run: the four panels of the source's Fig. 11, and true distances with and without the controller."""
+"""Figures of a run: the four panels of the paper's Fig. 11, and true distances with and without the controller."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def figure_11(log: RunLog, path: Path, title: str = "", activation: Activation |
         log: The run.
         path: PNG or PDF to write.
         title: Above the figure.
-        activation: For the thresholds shown; the source's by default.
+        activation: For the thresholds shown; the paper's by default.
     """
     import matplotlib
 
@@ -56,7 +56,13 @@ def figure_11(log: RunLog, path: Path, title: str = "", activation: Activation |
 
 
 def distance_figure(log: RunLog, without: NDArray[np.float64], path: Path) -> None:
-    """True smallest distance robot-board with the controller and with the robot keeping its pose."""
+    """True smallest distance robot-board with the controller and with the robot keeping its pose.
+
+    Args:
+        log: Of the run.
+        without: That distance of a robot that keeps its pose, (ticks,) [m].
+        path: The file to write.
+    """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

@@ -29,6 +29,11 @@ class Camera:
     def __init__(self, scene: Scene, size: tuple[int, int] = (960, 540), *, camera: str = CAMERA) -> None:
         """Open a context of a size (width, height) [px].
 
+        Args:
+            scene: What is rendered.
+            size: (width, height) [px].
+            camera: Name of the camera.
+
         Raises:
             ConfigurationError: The size is odd or too large, or the scene has no such camera.
             RuntimeError: No OpenGL back end works.
@@ -141,7 +146,13 @@ class VideoWriter:
         return self
 
     def add(self, data: Any, overlay: DangerOverlay | None = None, caption: Caption | None = None) -> Frame:
-        """Append a frame of the present state and return it, (height, width, 3) RGB."""
+        """Append a frame of the present state and return it, (height, width, 3) RGB.
+
+        Args:
+            data: MuJoCo's state.
+            overlay: What is drawn into the scene.
+            caption: What is written below it.
+        """
         if self._camera is None or self._file is None:
             raise RuntimeError("VideoWriter.add belongs into its with block")
         frame = np.ascontiguousarray(self._camera.picture(data, overlay))

@@ -65,7 +65,13 @@ def _draw(axis: Any, actor: Any, duration: float, colour: str) -> None:
 
 
 def encounter_figure(log: RunLog, path: Path, title: str = "") -> None:
-    """True distances of robot to people and boards, danger, and how fast the robot moves, over time."""
+    """True distances of robot to people and boards, danger, and how fast the robot moves, over time.
+
+    Args:
+        log: Of the run.
+        path: The file to write.
+        title: Of the figure.
+    """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

@@ -27,7 +27,15 @@ class ExperimentName(StrEnum):
 def experiment_loop(
     name: str, robot: Robot, law: Law | None = None, seed: int = 0, sensor: str = "ideal"
 ) -> tuple[Any, float]:
-    """A loop with `controller`, `plant`, `scene`, `step` and `advance`, and how long the experiment takes [s]."""
+    """A loop with `controller`, `plant`, `scene`, `step` and `advance`, and how long the experiment takes [s].
+
+    Args:
+        name: A value of `ExperimentName`.
+        robot: The robot.
+        law: The control law; the controller's default if None.
+        seed: Of what is random.
+        sensor: ``ideal`` or ``sharp``.
+    """
     if name == ExperimentName.pick_and_place:
         third = PickPlaceExperiment(robot, law, seed=seed, sensor=sensor)
         return PickLoop(third), third.duration

@@ -77,6 +77,12 @@ def encounter(log: RunLog, robot: Robot) -> Encounter:
 
 
 def fastest_point(robot: Robot, q: np.ndarray, qd: np.ndarray) -> float:
-    """Speed of the fastest end of the robot's wire model [m/s]."""
+    """Speed of the fastest end of the robot's wire model [m/s].
+
+    Args:
+        robot: The robot.
+        q: (n,) [rad].
+        qd: (n,) [rad/s].
+    """
     wire = robot.wire(q, qd)
     return float(np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1).max())

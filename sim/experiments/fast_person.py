@@ -79,7 +79,15 @@ def runs(
 
 
 def experiment_with(name: str, story: Story, robot: Robot, law: Law | None = None, lag: float = 0.0) -> Experiment:
-    """An experiment of `EXPERIMENTS` with a story's people; in the third one they carry no screws."""
+    """An experiment of `EXPERIMENTS` with a story's people; in the third one they carry no screws.
+
+    Args:
+        name: A key of `EXPERIMENTS`.
+        story: What the people do.
+        robot: The robot.
+        law: The control law; the experiment's own by default.
+        lag: Of the plant's joints [s].
+    """
     if name == "pick-and-place":
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / STORY.name

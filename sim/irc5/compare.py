@@ -167,7 +167,17 @@ class _Late:
 def over_the_wire(
     name: str, robot: Robot, duration: float, settings: EgmSettings, *options: str, lockstep: bool, cycles: int = 0
 ) -> tuple[Course, RobotRun, dict[str, Any]]:
-    """The same with `qpsafe stream` in a process of its own: its course, what the robot saw, the stream's report."""
+    """The same with `qpsafe stream` in a process of its own: its course, what the robot saw, the stream's report.
+
+    Args:
+        name: Of the experiment.
+        robot: The robot.
+        duration: [s].
+        settings: Of the simulated controller.
+        options: More of `qpsafe stream`.
+        lockstep: Whether a packet waits for its answer.
+        cycles: Of the third experiment.
+    """
     with contextlib.closing(UdpExchange(axes_of_robot(robot), None, lockstep=5.0 if lockstep else 0.0)) as exchange:
         events = "{}:{}".format(*exchange.events)
         with stream_process("--experiment", name, "--events", events, *options) as stream:
@@ -197,7 +207,13 @@ class Agreement(NamedTuple):
 
 
 def agreement(a: Array, b: Array, most: int = 0) -> Agreement:
-    """Compare `a` with `b`, moved by up to `most` cycles so that the root mean square is least."""
+    """Compare `a` with `b`, moved by up to `most` cycles so that the root mean square is least.
+
+    Args:
+        a: Course (ticks, n).
+        b: Another one.
+        most: Cycles.
+    """
     found = []
     for shift in range(most + 1):
         n = min(len(a), len(b) - shift)

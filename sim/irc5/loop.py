@@ -58,14 +58,28 @@ class DrivenPlant:
 
 
 class FarController:
-    """Stands in an experiment's loop for the controller at the other end of the wire."""
+    """Stands in an experiment's loop for the controller at the other end of the wire.
+
+    Args:
+        robot: The robot.
+        irc5: Its controller.
+        exchange: Sends a packet and takes what has come.
+        dt: Tick [s].
+    """
 
     def __init__(self, robot: Robot, irc5: SimulatedIrc5, exchange: Exchange, dt: float) -> None:
         self.robot, self.dt = robot, dt
         self._irc5, self._exchange = irc5, exchange
 
     def step(self, q: Array, qd: Array, distances: Array, *, ages: Array | None = None) -> Answered:
-        """Send what the robot measures and take what has come; in lock-step, the answer to this very packet."""
+        """Send what the robot measures and take what has come; in lock-step, the answer to this very packet.
+
+        Args:
+            q: Measured joint position (n,) [rad].
+            qd: Unused: EGM has no velocities.
+            distances: Of the spots (k,) [m].
+            ages: Unused: they are fresh.
+        """
         irc5 = self._irc5
         packet = irc5.packet()
         answers, events = self._exchange.swap(packet, distances)

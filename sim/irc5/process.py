@@ -150,7 +150,14 @@ def run_robot(
 
 
 def farewell(run: Irc5Loop, exchange: UdpExchange, lockstep: bool = False, cycles: int = 25) -> None:
-    """Stop the RAPID program and say so for some cycles, so that the other end knows why nothing comes any more."""
+    """Stop the RAPID program and say so for some cycles, so that the other end knows why nothing comes any more.
+
+    Args:
+        run: The loop that ends.
+        exchange: Sends a packet and takes what has come.
+        lockstep: Whether a packet waits for its answer.
+        cycles: How many.
+    """
     run.irc5.program(False)
     with suppress(NoAnswerError):
         for _ in range(cycles):

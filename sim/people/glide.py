@@ -16,7 +16,14 @@ class Track:
         self._first = value
 
     def glide(self, start: float, to: float, speed: float, ramp: float) -> float:
-        """Append a glide with cosine-shaped speed ramps [s]; returns the time it ends."""
+        """Append a glide with cosine-shaped speed ramps [s]; returns the time it ends.
+
+        Args:
+            start: When [s].
+            to: Value at the end.
+            speed: Greatest speed [1/s].
+            ramp: Length of each ramp [s].
+        """
         # at full speed: distance = speed (duration - ramp); short glides never reach full speed
         duration = max(abs(to - self.value) / speed + ramp, 2.0 * ramp)
         self._starts.append(start)

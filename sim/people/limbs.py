@@ -49,7 +49,13 @@ def axis_quaternions(directions: Array) -> Array:
 
 
 def bend_trunk(ends: Array, lean: float, gaze: tuple[float, float]) -> None:
-    """Bend the trunk forwards about the hips, and tilt the head; heights above the hips."""
+    """Bend the trunk forwards about the hips, and tilt the head; heights above the hips.
+
+    Args:
+        ends: Of the segments (segments, 2, 3) [m], changed in place.
+        lean: Forwards [rad].
+        gaze: By how much the head tilts forwards and to the left [rad].
+    """
     neck = ends[1, 1].copy()
     tilt = math.hypot(*gaze)
     if tilt > 0.0:  # the head about the upper end of the neck, towards where it looks
@@ -67,7 +73,15 @@ def bend_trunk(ends: Array, lean: float, gaze: tuple[float, float]) -> None:
 
 
 def roll_foot(body: Body, x: float, y: float, yaw: float, lift: float) -> tuple[Place, Place, Place]:
-    """Ankle, heel and toe in the root's frame; a foot that trails rolls up over its toes, which stay where they are."""
+    """Ankle, heel and toe in the root's frame; a foot that trails rolls up over its toes, which stay where they are.
+
+    Args:
+        body: Whose foot it is.
+        x: Of the foot in the root's frame, forwards [m].
+        y: To the left [m].
+        yaw: [rad].
+        lift: Height of the sole [m].
+    """
     c, s = math.cos(yaw), math.sin(yaw)
     share = min(max((-(x * c + y * s) - 0.06) / 0.26, 0.0), 1.0)
     roll = HEEL_OFF * share**2 * (3.0 - 2.0 * share)

@@ -102,7 +102,13 @@ class Person:
     body: Body = FIRST
 
     def standing_feet(self, x: float, y: float, heading: float) -> tuple[Foot, Foot]:
-        """Left and right foot of a person who stands still at (x, y) [m], looking along `heading` [rad]."""
+        """Left and right foot of a person who stands still at (x, y) [m], looking along `heading` [rad].
+
+        Args:
+            x: [m].
+            y: [m].
+            heading: [rad].
+        """
         dx, dy = -math.sin(heading) * (self.body.hip + 0.005), math.cos(heading) * (self.body.hip + 0.005)
         return Foot(x + dx, y + dy, heading + 0.10), Foot(x - dx, y - dy, heading - 0.10)
 

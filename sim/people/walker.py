@@ -82,7 +82,16 @@ class Walk:
         turning: bool = True,
         ease: float | None = None,
     ) -> None:
-        """Plan it: `start` [s], way-points (x, y) [m], speed [m/s], T [s]; no corner may be sharper than `SHARP`."""
+        """Plan it: `start` [s], way-points (x, y) [m], speed [m/s], T [s]; no corner may be sharper than `SHARP`.
+
+        Args:
+            start: When [s].
+            root: From where.
+            points: Way-points.
+            speed: Between the corners.
+            turning: Towards travel; else the heading stays.
+            ease: T, time of speeding up, of slowing down and of a corner; by default longer the faster.
+        """
         corners = np.array([root[:2], *points])
         legs = np.diff(corners, axis=0)
         lengths = np.hypot(*legs.T)

@@ -77,6 +77,12 @@ def cast_pairs(setup: Setup, sample: int, first: int, count: int) -> Detections:
 
     A ray that meets the robot, the pedestal or the floor first detects nothing, nor does one that meets the dummy
     nearer than the sensor's range: the sensor reads it as farther away.
+
+    Args:
+        setup: The study's.
+        sample: Which one.
+        first: Number of the first pair.
+        count: How many.
     """
     caster, nodes = _caster(setup), setup.nodes
     world = caster.world

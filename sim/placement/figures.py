@@ -22,12 +22,18 @@ LABELS = {
     "danger": "danger seen by each link",
     "evasion": "evasive torque of each link",
 }
-#: What the source reports: spots, detection probability.
+#: What the paper reports: spots, detection probability.
 SOURCE = (20, 0.89)
 
 
 def figure_9(result: Study, path: Path, title: str) -> None:
-    """Detection probability, cost and danger measured over the number of spots; written whole or not at all."""
+    """Detection probability, cost and danger measured over the number of spots; written whole or not at all.
+
+    Args:
+        result: The study.
+        path: The file to write.
+        title: Of the figure.
+    """
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -57,7 +63,7 @@ def figure_9(result: Study, path: Path, title: str) -> None:
             axes[1].plot(k, curve.cost[1], **look)
             axes[2].plot(k, curve.danger[1], **look)
             axes[2].plot(k, curve.danger[0], color=COLOURS[name], linewidth=0.5)
-        axes[0].plot(*SOURCE, "k*", markersize=9, label="the source: 20 spots, 89 %")
+        axes[0].plot(*SOURCE, "k*", markersize=9, label="the paper: 20 spots, 89 %")
         answer = result.answer
         axes[0].plot(
             len(answer.solution.chosen), answer.fair.probability, "o", color="black", fillstyle="none", label="chosen"

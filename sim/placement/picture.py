@@ -66,7 +66,14 @@ def picture(
 
 
 def save_picture(path: Path, robot: Robot, spots: SpotArray, chosen: NDArray[np.intp] | None = None) -> None:
-    """Write `picture` as a PNG, whole or not at all."""
+    """Write `picture` as a PNG, whole or not at all.
+
+    Args:
+        path: The file.
+        robot: The robot.
+        spots: All nodes.
+        chosen: Those that carry a spot; None: draw all nodes.
+    """
     import matplotlib.image
 
     part = path.with_name("." + path.name + ".part.png")

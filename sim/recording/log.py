@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.text.words import counted
 from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]
@@ -40,11 +41,12 @@ class RunLog:
         orientation_error, position_error: Commanded pose against the reference (N, 3) [rad, m]; of a robot with several
             tools one after the other (N, 3 tools), as in the next three.
         measured_orientation_error, measured_position_error: The plant's pose against it (N, 3) [rad, m].
-        euler_error: The source's orientation error, difference of ZYX Euler angles (N, 3) [rad].
+        euler_error: The paper's orientation error, difference of ZYX Euler angles (N, 3) [rad].
         board_distance, person_distance: Smallest true distance robot-board, robot-person (N,) [m].
         solve_time: Wall time of `step` (N,) [s]; the only part that differs between equal runs.
         messages: (tick, message) of everything unusual.
         spot_names: (k,).
+        metrics: What the user measured, (N,) or (N, k) by name; see `Control.metrics`.
     """
 
     dt: float
@@ -70,6 +72,12 @@ class RunLog:
     solve_time: Array
     messages: tuple[tuple[int, str], ...]
     spot_names: tuple[str, ...]
+    metrics: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        regimes = {name: int((self.regime == name).sum()) for name in dict.fromkeys(self.regime.tolist())}
+        rows, odd = counted(len(self.time), "tick"), int((self.status != "ok").sum())
+        return f"RunLog({rows}, dt={self.dt:.4g}, {regimes}, cdf_n<={self.cdf_n.max():.4g}, {odd} not ok)"
 
     def intervals(self, shortest: float = 0.0) -> list[Interval]:
         """Regimes in the order they were entered; those shorter than `shortest` [s] are merged into the one before."""
@@ -107,6 +115,8 @@ class RunLog:
 
         for name, unit in _CSV:
             add(name, getattr(self, name), unit)
+        for name, values in self.metrics.items():
+            add(name, values.reshape(len(values), -1) if values.ndim > 1 else values)
         return names, columns
 
 
@@ -134,7 +144,14 @@ _CSV = (
 
 
 def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: float = 0.0) -> list[Interval]:
-    """Stretches of equal names; those shorter than `shortest` [s] are merged into the one before them."""
+    """Stretches of equal names; those shorter than `shortest` [s] are merged into the one before them.
+
+    Args:
+        time: Of every tick (ticks,) [s].
+        names: Of every tick (ticks,).
+        dt: Tick [s].
+        shortest: [s].
+    """
     found: list[Interval] = []
     for t, name in zip(time, names, strict=True):
         if found and found[-1].name == name:
@@ -151,7 +168,7 @@ def intervals(time: Array, names: Sequence[str] | NDArray, dt: float, shortest: 
 
 
 #: Fields of `RunLog` in the order of a recorded row.
-_RECORDED = tuple(f.name for f in fields(RunLog) if f.name not in ("dt", "messages", "spot_names"))
+_RECORDED = tuple(f.name for f in fields(RunLog) if f.name not in ("dt", "messages", "spot_names", "metrics"))
 
 
 class Recorder:
@@ -162,6 +179,7 @@ class Recorder:
         self.spot_names = spot_names
         self._rows: list[tuple] = []
         self._messages: list[tuple[int, str]] = []
+        self._metrics: dict[str, list[Array]] = {}
 
     def add(
         self,
@@ -172,21 +190,30 @@ class Recorder:
         measured: tuple[Array, Array],
         euler: Array,
         gaps: tuple[float, float],
+        errors: tuple[Array, Array] | None = None,
+        metrics: Mapping[str, Array] | None = None,
     ) -> None:
         """Record one tick.
 
         Args:
-            tick: From the controller; a position task for each tool, then an orientation task for each.
+            tick: From the controller.
             q, qd: Measured joints (n,).
             distances: Readings of the spots (k,).
             measured: Position (3 tools,) and orientation error (3 tools,) of the measured pose.
             euler: Euler-angle error of the commanded pose (3 tools,).
             gaps: Smallest true distances robot-board, robot-person [m].
+            errors: Position (3 tools,) and orientation error (3 tools,) of the commanded pose; by default the tick's,
+                whose tasks are then a position for each tool and an orientation for each.
+            metrics: Of this tick, by name; the same names at every tick.
         """
         self._messages.extend((len(self._rows), message) for message in tick.messages)
-        tools = len(tick.activations) // 2
-        errors = tick.errors or (np.full(3, np.nan),) * 2 * tools
-        position, orientation = np.concatenate(errors[:tools]), np.concatenate(errors[tools:])
+        if errors is None:
+            tools = len(tick.activations) // 2
+            own = tick.errors or (np.full(3, np.nan),) * 2 * tools
+            errors = np.concatenate(own[:tools]), np.concatenate(own[tools:])
+        position, orientation = errors
+        for name, value in (metrics or {}).items():
+            self._metrics.setdefault(name, []).append(value)
         self._rows.append(
             (
                 tick.reference.time,
@@ -215,4 +242,5 @@ class Recorder:
         """The run so far as arrays."""
         columns = (np.array(column) for column in zip(*self._rows, strict=True))
         arrays: dict[str, Any] = dict(zip(_RECORDED, columns, strict=True))
-        return RunLog(dt=self.dt, messages=tuple(self._messages), spot_names=self.spot_names, **arrays)
+        metrics = {name: np.array(values) for name, values in self._metrics.items()}
+        return RunLog(dt=self.dt, messages=tuple(self._messages), spot_names=self.spot_names, metrics=metrics, **arrays)

@@ -55,7 +55,13 @@ class StateRecorder:
         self._mocap: list[NDArray[np.float64]] = []
 
     def observe(self, tick: Tick, scene: Scene, plant: Plant) -> None:
-        """Keep the state if one is due."""
+        """Keep the state if one is due.
+
+        Args:
+            tick: The tick.
+            scene: What is simulated.
+            plant: The state of it.
+        """
         if tick.reference.seq % self._every == 0:
             self._qpos.append(plant.data.qpos.copy())
             self._mocap.append(np.hstack((plant.data.mocap_pos, plant.data.mocap_quat)))

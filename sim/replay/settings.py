@@ -26,6 +26,7 @@ from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 from qpsafe.sim.experiments.pick_place.loop import PickLoop
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.people.person import Board, Person
+from qpsafe.sim.replay.settings_parts import part_settings, parts_of
 from qpsafe.sim.replay.settings_pick import KIND, pick_of, pick_settings
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.sim.stories.story import StepProblem, Story
@@ -41,8 +42,8 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     """Everything that defines a run, for JSON.
 
     Raises:
-        ConfigurationError: The law is one of the user's own, or the body differs from the source's person: replay could
-            not build it again.
+        ConfigurationError: Law, tasks, thresholds or evasion are of the user's own making, or the body differs from
+            the paper's person: replay could not build it again.
     """
     kind = {FixedExperiment: "fixed", PathExperiment: "path", PickPlaceExperiment: KIND}.get(type(experiment))
     if kind is None:
@@ -56,6 +57,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "law": law_settings(experiment.law),
         "rules": None if experiment.rules is None else asdict(experiment.rules),
         "recovery": None if experiment.recovery is None else asdict(experiment.recovery),
+        **part_settings(experiment),
     }
     if isinstance(experiment, PickPlaceExperiment):
         return found | pick_settings(experiment)
@@ -82,6 +84,7 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
         options: dict[str, Any] = {"law": law_of(settings["law"])}
         for name, make in (("rules", SensingRules), ("recovery", RecoveryRules)):
             options[name] = None if settings[name] is None else make(**settings[name])
+        options |= parts_of(robot, settings)
         if settings["kind"] == KIND:
             return pick_of(robot, settings, options)
         options |= {name: settings[name] for name in PLAIN}
@@ -141,7 +144,7 @@ def law_of(settings: Mapping[str, Any] | None) -> Law | None:
 
 def _choreography(choreography: Choreography) -> dict[str, Any]:
     if choreography.person.body != Person().body:
-        raise ConfigurationError("settings_of", "choreography.person.body", None, "the body of the source's person")
+        raise ConfigurationError("settings_of", "choreography.person.body", None, "the body of the paper's person")
     found = asdict(choreography)
     del found["person"]["body"]
     return found

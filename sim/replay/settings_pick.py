@@ -26,7 +26,13 @@ def pick_settings(experiment: PickPlaceExperiment) -> dict[str, Any]:
 
 
 def pick_of(robot: Robot, settings: Mapping[str, Any], options: Mapping[str, Any]) -> PickPlaceExperiment:
-    """The experiment that settings describe; `options` are the law and the rules."""
+    """The experiment that settings describe; `options` are the law and the rules.
+
+    Args:
+        robot: The robot.
+        settings: As the run file has them.
+        options: The law and the rules.
+    """
     with tempfile.TemporaryDirectory() as folder:
         program, people = Path(folder) / "recorded-program.toml", Path(folder) / "recorded-people.toml"
         program.write_text(settings["program"], encoding="utf-8")

@@ -69,7 +69,13 @@ class Result(NamedTuple):
 
 
 def random_moments(experiment: FixedExperiment, count: int, seed: int) -> list[int]:
-    """Ticks at random within the approaches."""
+    """Ticks at random within the approaches.
+
+    Args:
+        experiment: Whose approaches.
+        count: How many.
+        seed: Of the choice.
+    """
     rng = np.random.default_rng(seed)
     windows = np.array(experiment.windows())
     chosen = windows[rng.integers(len(windows), size=count)]

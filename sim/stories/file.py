@@ -49,7 +49,13 @@ def load_story(path: str | Path, *, floor: float = -0.55) -> Story:
 
 
 def parse_story(text: str, path: str | Path = "story", *, floor: float = -0.55) -> Story:
-    """Plan a story from its text; `path` only names it in errors. See `load_story`."""
+    """Plan a story from its text; `path` only names it in errors. See `load_story`.
+
+    Args:
+        text: TOML.
+        path: Names it in errors.
+        floor: Height of the floor [m].
+    """
     return _planned(TomlText(text, path, StoryError), floor)
 
 

@@ -14,7 +14,14 @@ from qpsafe.sim.stories.timeline import FARTHER, LOOK, TimeLine
 
 
 class StepProblem(QpsafeError, ValueError):
-    """A step cannot be done: which person, which key, its value, and what was expected."""
+    """A step cannot be done: which person, which key, its value, and what was expected.
+
+    Args:
+        person: Place in the file, from 0.
+        keys: Where the value is.
+        value: As found.
+        expected: Instead, in words.
+    """
 
     def __init__(self, person: int, keys: Sequence[str | int], value: object, expected: str) -> None:
         self.person, self.keys, self.value, self.expected = person, list(keys), value, expected
@@ -41,6 +48,11 @@ class Plan(TimeLine):
 
     def __init__(self, table: PersonTable, index: int, floor: float) -> None:
         """Plan the steps; `index` is the person's place in the file.
+
+        Args:
+            table: The person's, from the file.
+            index: Place in the file, from 0.
+            floor: Height of the floor [m].
 
         Raises:
             StepProblem: A step cannot be done.

@@ -1,7 +1,7 @@
 """Rays of the distance sensors against everything: person, board, floor, pedestal and the robot itself.
 
 A spot's own body is left out: it cannot see what it is mounted on. What of the rest does not count is decided by
-the controller's filters, as in the source, not by the rays.
+the controller's filters, as in the paper, not by the rays.
 
 One `mj_multiRay` call a spot: the rays of its cone start at one point. The poses that the plant and
 `Scene.place_person` have just computed are read; `mujoco.batch.Batch.ray` casts thousands faster, but redoes the

@@ -120,7 +120,7 @@ def build_scene(
         robot: From `load_robot`; its model needs one motor per joint, named like the joint.
         timestep: Of the physics [s].
         pedestal: Height of the robot's base above the floor [m].
-        board: Size of the card board and how it is held, for the one person of the source's experiments.
+        board: Size of the card board and how it is held, for the one person of the paper's experiments.
         contacts: Whether the robot can touch itself and the floor. Off by default: a run that relies on touching has
             failed anyway. People never touch anything.
         furnish: Adds more to the `mujoco.MjSpec` before it is compiled, e.g. `Cell.furnish`.

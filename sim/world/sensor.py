@@ -39,7 +39,14 @@ class IdealSensor:
 
 
 class SharpSensor:
-    """Simulated Sharp sensors, and the distances that curves identified from them make of their voltages."""
+    """Simulated Sharp sensors, and the distances that curves identified from them make of their voltages.
+
+    Args:
+        rays: What is really in front of the spots.
+        spots: The distance sensors.
+        model: Of such a sensor.
+        seed: Of the units' differences and of noise.
+    """
 
     def __init__(self, rays: SpotRays, spots: SpotArray, model: SharpModel | None = None, seed: int = 0) -> None:
         self._rays = rays
@@ -56,7 +63,14 @@ class SharpSensor:
 
 
 def make_sensor(kind: str, scene: Scene, spots: SpotArray, seed: int = 0) -> Sensor:
-    """The sensor of the given kind, `ideal` or `sharp`."""
+    """The sensor of the given kind, `ideal` or `sharp`.
+
+    Args:
+        kind: ``ideal`` or ``sharp``.
+        scene: What is sensed.
+        spots: The distance sensors.
+        seed: Of a Sharp sensor's noise and spread.
+    """
     rays = SpotRays(scene, spots)
     if kind == "ideal":
         return IdealSensor(rays)

@@ -27,11 +27,11 @@ class SharpModel:
         cycle: The sensor measures once in this time and keeps its voltage meanwhile, 38 ms by its data sheet [s].
         analogue: Cut-off of the analogue low pass [Hz] (*).
         digital: Cut-off of the digital low pass [Hz] (*).
-        bits: Of the converter; the source has 12.
+        bits: Of the converter; the paper has 12.
         full_scale: Voltage that the converter saturates at [V] (*).
         delay: Further delay, in whole samples [s].
         dropout: Probability that a sample is lost and reads 0 V.
-        dt: Sample time [s]; the source has 250 Hz.
+        dt: Sample time [s]; the paper has 250 Hz.
     """
 
     spread: float = 0.05

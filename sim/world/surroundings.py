@@ -91,7 +91,15 @@ def add_surroundings(spec: Any, pedestal: float) -> None:
 
 
 def add_camera(world: Any, name: str, position: list[float], target: list[float], fovy: float) -> None:
-    """A camera that looks at a point with the horizon level."""
+    """A camera that looks at a point with the horizon level.
+
+    Args:
+        world: MuJoCo's specification.
+        name: Of the camera.
+        position: (3,) [m].
+        target: What it looks at (3,) [m].
+        fovy: Vertical field of view [deg].
+    """
     backward = np.subtract(position, target)
     backward /= np.linalg.norm(backward)
     right = np.cross([0.0, 0.0, 1.0], backward)

@@ -14,11 +14,18 @@ import qpsafe
 
 N, LINKS = 6, 6
 PROMISED = [
+    "Box",
     "DangerField",
     "HierarchicalLaw",
+    "Law",
+    "LawProblem",
+    "LawResult",
     "Level",
     "NullspaceLaw",
+    "Robot",
     "SafetyController",
+    "Sample",
+    "Task",
     "WeightedLaw",
     "load_robot",
     "nullspace_velocity",
@@ -70,7 +77,27 @@ def test_every_public_name_is_there() -> None:
             assert inspect.getdoc(value), name
             assert value.__module__.startswith("qpsafe."), name
             assert getattr(importlib.import_module(value.__module__), name) is value
-    assert {*qpsafe.__all__} == {name for name in dir(qpsafe) if name in qpsafe._PUBLIC or name == "__version__"}
+
+
+def test_completion_offers_public_names_only_and_imports_nothing() -> None:
+    code = (
+        "import json, sys, rlcompleter, qpsafe\n"
+        "complete = rlcompleter.Completer({'qpsafe': qpsafe}).complete\n"
+        "found = []\n"
+        "while (text := complete('qpsafe.', len(found))) is not None: found.append(text)\n"
+        "loaded = [name for name in sys.modules if name.startswith('qpsafe.')]\n"
+        "same = qpsafe.Wire is qpsafe.Wire is __import__('qpsafe.robot.wire').robot.wire.Wire\n"
+        "qpsafe.Wire = None\n"
+        "print(json.dumps([found, dir(qpsafe), loaded, same, qpsafe.Wire]))"
+    )
+    found, listed, loaded, same, exchanged = fresh(code)
+    assert sorted(text.rstrip("(") for text in found) == [
+        f"qpsafe.{name}" for name in sorted(qpsafe.__all__) if name != "__version__"
+    ]
+    assert listed == sorted(qpsafe.__all__)
+    assert loaded == []
+    assert same
+    assert exchanged is None  # as a test of somebody's own program may want it
 
 
 def test_static_checkers_are_told_every_public_name() -> None:

@@ -22,7 +22,7 @@ RANDOM = np.random.default_rng(140).uniform(ROBOT.lower, ROBOT.upper, (100, 6))
 DH = [(0, 0.352, 0.07, -90), (-90, 0, 0.36, 0), (0, 0, 0, -90), (0, 0.38, 0, 90), (0, 0, 0, -90), (180, 0.065, 0, 0)]
 LIMITS = [(-180, 180, 200), (-90, 110, 200), (-230, 50, 260), (-200, 200, 360), (-115, 115, 360), (-400, 400, 450)]
 
-# Outer extents at the zero pose, base frame [m]; None where the source does not say.
+# Outer extents at the zero pose, base frame [m]; None where the paper does not say.
 EXTENTS = {
     "base": [(-0.313, 0.175), (-0.201, 0.201), (0.0, 0.153)],
     "link_1": [(-0.160, 0.192), (-0.176, 0.204), (0.089, 0.452)],

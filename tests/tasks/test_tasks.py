@@ -102,7 +102,7 @@ def test_every_task_alone_is_reached_by_the_controller(name: str) -> None:
 
 @pytest.mark.parametrize(("kind", "gain"), [(PositionTask, 1.0), (OrientationTask, 10.0)])
 def test_clik_error_decays_with_its_gain(kind, gain: float) -> None:
-    """e(t) = e(0) exp(-K t) when the velocity is followed exactly; the source's gains are the defaults."""
+    """e(t) = e(0) exp(-K t) when the velocity is followed exactly; the paper's gains are the defaults."""
     rng = np.random.default_rng(5)
     goal = random_pose(rng)
     pose = goal.copy()

@@ -56,7 +56,7 @@ def fixed(
     spots: Annotated[
         str | None, typer.Option(help="Other sensors: a file in the robot's folder, as spots-by-hand.toml, or a path.")
     ] = None,
-    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the source's.")] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the paper's.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -159,7 +159,13 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
 
 
 def show(report: Report, title: str, screen: Console) -> None:
-    """Print the report as tables."""
+    """Print the report as tables.
+
+    Args:
+        report: What was measured.
+        title: Of the first table.
+        screen: Where to.
+    """
     from rich.text import Text
 
     from qpsafe.cli.sheet import Sheet

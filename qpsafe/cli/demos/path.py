@@ -37,7 +37,7 @@ def path(
 ) -> None:
     """Second experiment: follow a line back and forth while a person with a card board comes and goes.
 
-    Four runs: the hierarchical law (strict, and with the source's projection), the null-space law, and strict without
+    Four runs: the hierarchical law (strict, and with the paper's projection), the null-space law, and strict without
     suspension and recovery.
     """
     screen = console(json)
@@ -115,7 +115,14 @@ def path(
 
 
 def show(found: dict[str, PathFigures], checks: list[Check], left_out: list[str], screen: Console) -> None:
-    """Print figures and promises as tables."""
+    """Print figures and promises as tables.
+
+    Args:
+        found: Figures of each law, by its name.
+        checks: What was promised and measured.
+        left_out: Promises that do not apply to this run, in words.
+        screen: Where to.
+    """
     from qpsafe.cli.sheet import Sheet
 
     def shown(value: float | None, form: str, size: float = 1.0) -> str:

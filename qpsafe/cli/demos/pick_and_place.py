@@ -143,7 +143,14 @@ def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Con
 
 
 def show(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check], screen: Console) -> None:
-    """Print figures and promises as tables."""
+    """Print figures and promises as tables.
+
+    Args:
+        runs: Figures of every seed.
+        alone: Those of the run without people.
+        checks: What was promised and measured.
+        screen: Where to.
+    """
     from qpsafe.cli.sheet import Sheet
     from qpsafe.sim.experiments.pick_place.report import cost, spread
 

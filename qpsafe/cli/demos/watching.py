@@ -26,7 +26,18 @@ def observed(
     label: str,
     states: StateRecorder | None = None,
 ) -> Iterator[tuple[Observer, bool]]:
-    """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not."""
+    """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not.
+
+    Args:
+        experiment: What is watched.
+        path: Of the video.
+        video: Whether to film.
+        view: Whether to open MuJoCo's viewer.
+        screen: Where to say why there is no video or viewer.
+        progress: Where ticks are counted.
+        label: What the bar says.
+        states: Keeps states for a run file; None keeps none.
+    """
     from qpsafe.danger.thresholds import robot_activation
     from qpsafe.errors import MissingExtraError
     from qpsafe.sensing.spots import load_spots

@@ -78,7 +78,14 @@ class Cascade:
     """
 
     def __init__(self, backend: str, start: Array, lower: Array, upper: Array) -> None:
-        """Begin at `start`, (n,), inside the box `lower`, `upper`, each (n,), possibly infinite."""
+        """Begin at `start`, (n,), inside the box `lower`, `upper`, each (n,), possibly infinite.
+
+        Args:
+            backend: A solver of qpsolvers, by name.
+            start: (n,) [rad/s].
+            lower: (n,) [rad/s].
+            upper: (n,) [rad/s].
+        """
         n = start.shape[0]
         self.backend = backend
         self.x = start

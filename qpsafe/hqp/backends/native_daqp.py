@@ -54,7 +54,13 @@ class Arranged(NamedTuple):
 
 
 def call_daqp(arranged: Arranged, lower: Array, upper: Array) -> tuple[Array | None, int]:
-    """Let DAQP solve; see `solve_daqp`."""
+    """Let DAQP solve; see `solve_daqp`.
+
+    Args:
+        arranged: From `arrange`.
+        lower: (n,) of q̇ [rad/s].
+        upper: (n,) of q̇ [rad/s].
+    """
     *arguments, ends = arranged
     if not arranged.A.size:  # nothing but the box
         return np.clip(-arranged.f, lower, upper), 0
@@ -66,7 +72,14 @@ def call_daqp(arranged: Arranged, lower: Array, upper: Array) -> tuple[Array | N
 
 
 def arrange(levels: list[Level], lower: Array, upper: Array, hard: bool) -> Arranged:
-    """Lay a hierarchy out for DAQP."""
+    """Lay a hierarchy out for DAQP.
+
+    Args:
+        levels: Highest priority first.
+        lower: (n,) of q̇ [rad/s].
+        upper: (n,) of q̇ [rad/s].
+        hard: Whether the first level holds hard rows, which go with the box.
+    """
     n = lower.shape[0]
     target = np.zeros(n)
     stack = list(levels)

@@ -66,12 +66,24 @@ class State(NamedTuple):
 
 
 def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
-    """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level."""
+    """Memory for problems of n joints, `rows` rows in all and m >= n rows in the largest level.
+
+    Args:
+        n: Joints.
+        rows: Of all levels.
+        m: Rows of the largest level, >= n.
+    """
     return np.zeros(floats_of(n, rows, m)), np.zeros(2 * (n + rows + 2 * n) + n + m + n + 2, np.int64)
 
 
 def floats_of(n: int, rows: int, m: int) -> int:
-    """How many floats `workspace` has, exactly."""
+    """How many floats `workspace` has, exactly.
+
+    Args:
+        n: Joints.
+        rows: Of all levels.
+        m: Rows of the largest level, >= n.
+    """
     rows, m = rows + 2 * n, m + n  # the closing identity, and rows that damping adds
     return rows * n + 3 * (n + rows) + n * (n + m) + n * n + 2 * m * m + 3 * (n + m) + m + 1 + 3 * n
 

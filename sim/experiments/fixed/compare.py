@@ -1,4 +1,4 @@
-"""The QP laws against the source's over whole experiments: the second half of `qpsafe compare`."""
+"""The QP laws against the paper's over whole experiments: the second half of `qpsafe compare`."""
 
 from __future__ import annotations
 

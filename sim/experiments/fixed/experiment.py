@@ -1,25 +1,23 @@
-"""The source's first experiment: a fixed tool reference while a person with a card board comes from three sides."""
+"""The paper's first experiment: a fixed tool reference while a person with a card board comes from three sides."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.robot.state import RobotState
 from qpsafe.sim.experiments.fixed.loop import FixedLoop
 from qpsafe.sim.experiments.fixed.settings import FixedSettings
+from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tasks.rotation import euler_zyx, log3
 from qpsafe.tick import Tick
-
-if TYPE_CHECKING:
-    pass
 
 Observer = Callable[[Tick, Scene, Plant], None]
 
@@ -54,6 +52,8 @@ class FixedExperiment(FixedSettings):
                 (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
                 np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
+                own_errors(self, commanded, goals),
+                self.measured(tick, scene, plant),
             )
             if observer is not None:
                 observer(tick, scene, plant)
@@ -71,12 +71,28 @@ class FixedExperiment(FixedSettings):
         return result
 
 
+def own_errors(
+    settings: Control, commanded: RobotState, goals: Mapping[str, NDArray[np.float64]]
+) -> tuple[NDArray, NDArray] | None:
+    """Position and orientation errors of all tools where tasks are the user's and say something else; else None.
+
+    Args:
+        settings: Of the experiment.
+        commanded: Where the robot is to be.
+        goals: Where each tool should be, (4, 4).
+    """
+    if settings.tasks is None:
+        return None
+    errors = [pose_error(commanded.pose(name), goal) for name, goal in goals.items()]
+    return np.concatenate([error[0] for error in errors]), np.concatenate([error[1] for error in errors])
+
+
 def pose_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
     """Position error (3,) [m] and rotation vector (3,) [rad] from `pose` to `target`."""
     return target[:3, 3] - pose[:3, 3], log3(target[:3, :3] @ pose[:3, :3].T)
 
 
 def euler_error(pose: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The source's orientation error: differences of the Euler angles φ, θ, ψ, wrapped to (-pi, pi] (3,) [rad]."""
+    """The paper's orientation error: differences of the Euler angles φ, θ, ψ, wrapped to (-pi, pi] (3,) [rad]."""
     difference = euler_zyx(target[:3, :3]) - euler_zyx(pose[:3, :3])
     return np.pi - np.mod(np.pi - difference, 2.0 * np.pi)

@@ -18,7 +18,6 @@ from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
-from qpsafe.tasks.task import Task
 from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
@@ -52,19 +51,22 @@ class FixedLoop:
         self.scene, self.walk = scene, experiment.walk
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)
         self.targets = experiment.references
-        # one hierarchy: where all tools are, over how they are turned
-        tasks: list[Task] = [PositionTask(name, target) for name, target in self.targets.items()]
-        tasks += [OrientationTask(name, target) for name, target in self.targets.items()]
+        parts, tasks = experiment.parts(), experiment.tasks
+        if tasks is None:  # one hierarchy: where all tools are, over how they are turned
+            kinds = PositionTask, OrientationTask
+            tasks = [kind(name, target) for kind in kinds for name, target in self.targets.items()]
+            if parts["activation"] is None:
+                parts["activation"] = robot_activation(robot, len(self.targets), len(self.targets))
         self.controller = SafetyController(
             robot,
             tasks,
             experiment.law,
-            activation=robot_activation(robot, len(self.targets), len(self.targets)),
             limits=None if experiment.limits else "off",
-            sensing=experiment.rules,
             known=known_obstacles(scene),
-            recovery=experiment.recovery,
             barrier=None if experiment.cap is None else DangerBarrier(experiment.cap),
+            sensing=experiment.rules,
+            recovery=experiment.recovery,
+            **parts,
         )
         spots = self.controller.spots
         assert spots is not None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from qpsafe.errors import RobotFileError
 from qpsafe.laws.problem import Law
 from qpsafe.sim.experiments.fixed.stage import robot_stage
+from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class FixedSettings:
-    """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
+class FixedSettings(Control):
+    """Everything that defines one run; equal settings give bit-identical logs (wall times aside). Tasks, thresholds,
+    evasion and metrics of one's own are those of `Control`.
 
     Attributes:
         robot: The robot, with spots.
@@ -56,6 +58,7 @@ class FixedSettings:
     story: Story | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.robot.spots_path is None:
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:

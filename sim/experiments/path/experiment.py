@@ -1,4 +1,4 @@
-"""The source's second experiment: the tool goes back and forth on a line while a person with a board comes and goes."""
+"""The paper's second experiment: the tool goes back and forth on a line while a person with a board comes and goes."""
 
 from __future__ import annotations
 

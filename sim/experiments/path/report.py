@@ -123,7 +123,7 @@ def promises(
     ]
     if "nullspace" in others:
         error, name = others["nullspace"].line_orientation, "null-space law: the same orientation error"
-        promised = "> 1e-3 rad, as the source reports"
+        promised = "> 1e-3 rad, as the paper reports"
         found.insert(1, name if error is None else Check(name, f"{error:.3g} rad", promised, bool(error > 1e-3)))
     for name, run in {"strict": strict, **others}.items():
         found.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", run.step - 1.0, 1e-9, "a_max dt"))
@@ -145,7 +145,13 @@ def promises(
 
 
 def to_dict(found: Mapping[str, PathFigures], checks: list[Check], left_out: Sequence[str]) -> dict[str, Any]:
-    """For JSON."""
+    """For JSON.
+
+    Args:
+        found: Figures of each law, by its name.
+        checks: What was promised and measured.
+        left_out: Promises that do not apply to this run, in words.
+    """
     return {
         "laws": {name: plain(asdict(item)) for name, item in found.items()},
         "checks": [check._asdict() for check in checks],

@@ -186,7 +186,13 @@ class Parts:
         return np.linalg.norm(data.qvel[self.v_addresses[:, None] + np.arange(3)], axis=1)
 
     def put(self, data: Any, k: int, position: Array) -> None:
-        """Place a screw upright and at rest, its head's top at a position (3,) [m]."""
+        """Place a screw upright and at rest, its head's top at a position (3,) [m].
+
+        Args:
+            data: MuJoCo's state.
+            k: Which screw.
+            position: (3,) [m].
+        """
         q, v = self.q_addresses[k], self.v_addresses[k]
         data.qpos[q : q + 7] = (*position, 1.0, 0.0, 0.0, 0.0)
         data.qvel[v : v + 6] = 0.0

@@ -1,22 +1,18 @@
-"""The source's third experiment: screws from a support into a box, while two people come for screws and bring some."""
+"""The paper's third experiment: screws from a support into a box, while two people come for screws and bring some."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.experiments.fixed.experiment import Observer, euler_error, pose_error
+from qpsafe.sim.experiments.fixed.experiment import Observer, euler_error, own_errors, pose_error
 from qpsafe.sim.experiments.pick_place.loop import RELEASE, PickEvent, PickLoop, motion
 from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.clearance import Furniture
 from qpsafe.sim.world.distance import person_distance
-
-if TYPE_CHECKING:
-    pass
 
 STATES = 10  # ticks between two states that are kept for pictures
 
@@ -85,6 +81,7 @@ class PickPlaceExperiment(PickPlaceSettings):
             done += tick.events.count(RELEASE)
             left, after = left - 1, after - (done >= self.cycles)
             pose, goal = state.pose("tcp"), self.reference.sample(tick.path_time).pose
+            commanded = robot.at(tick.reference.q)
             gap = person_distance(scene, plant.data).distance if self.people else np.inf
             recorder.add(
                 tick,
@@ -92,8 +89,10 @@ class PickPlaceExperiment(PickPlaceSettings):
                 qd,
                 distances,
                 pose_error(pose, goal),
-                euler_error(robot.pose("tcp", tick.reference.q), goal),
+                euler_error(commanded.pose("tcp"), goal),
                 (np.inf, gap),
+                own_errors(self, commanded, {"tcp": goal}),
+                self.measured(tick, scene, plant),
             )
             path_time.append(tick.path_time)
             wire = state.wire(qd)

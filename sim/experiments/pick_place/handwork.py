@@ -59,6 +59,11 @@ class Handwork:
         """Let hands do what they came for and screws go along; `taken` are screws that nobody can have.
 
         Call it at every tick, before the poses of geoms are brought up to date.
+
+        Args:
+            data: MuJoCo's state.
+            poses: Of every person.
+            taken: Screws that nobody can have.
         """
         tips = np.array([pose.hands for pose in poses]).reshape(-1, 2, 3)
         speed = np.zeros(tips.shape[:2])

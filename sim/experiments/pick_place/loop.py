@@ -62,14 +62,18 @@ class PickLoop:
         self.scene, self.cell, self.people = scene, cell, experiment.people
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)
         self.program = experiment.reference
+        tasks = experiment.tasks
+        if tasks is None:
+            tasks = [PositionTask("tcp", self.program), OrientationTask("tcp", self.program)]
         self.controller = SafetyController(
             robot,
-            [PositionTask("tcp", self.program), OrientationTask("tcp", self.program)],
+            tasks,
             experiment.law,
             sensing=experiment.rules,
             known=known_obstacles(scene),
             carried={"tcp": [SCREW]},  # the gripper may hold one
             recovery=experiment.recovery,
+            **experiment.parts(),
         )
         spots = self.controller.spots
         assert spots is not None

@@ -75,7 +75,13 @@ def timeline(run: PickRun, people: Sequence[str], path: Path, title: str = "") -
 
 
 def seeds_figure(runs: Sequence[PickFigures], alone: PickFigures, path: Path) -> None:
-    """Cycle times of every run, the undisturbed ones, and the mean cost of people per cycle."""
+    """Cycle times of every run, the undisturbed ones, and the mean cost of people per cycle.
+
+    Args:
+        runs: Figures of every seed.
+        alone: Those of the run without people.
+        path: The file to write.
+    """
     import matplotlib
     from matplotlib.figure import Figure
 

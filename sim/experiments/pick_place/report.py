@@ -102,7 +102,13 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 
 def promises(runs: Sequence[PickFigures], alone: PickFigures, cycles: int) -> list[Check]:
-    """What the third experiment is to show, over all runs and the one without people."""
+    """What the third experiment is to show, over all runs and the one without people.
+
+    Args:
+        runs: Figures of every seed.
+        alone: Those of the run without people.
+        cycles: How many a run was to do.
+    """
     every = [*runs, alone]
     unfinished = sum(not item.finished for item in every)
     delivered = min(item.delivered for item in runs)
@@ -129,7 +135,13 @@ def promises(runs: Sequence[PickFigures], alone: PickFigures, cycles: int) -> li
 
 
 def to_dict(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Check]) -> dict[str, Any]:
-    """For JSON."""
+    """For JSON.
+
+    Args:
+        runs: Figures of every seed.
+        alone: Those of the run without people.
+        checks: What was promised and measured.
+    """
     costs = [cost(item, alone) for item in runs]
     return {
         "runs": [plain(asdict(item)) | {"cost_per_cycle": c} for item, c in zip(runs, costs, strict=True)],

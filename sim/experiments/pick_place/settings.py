@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from qpsafe.laws.problem import Law
 from qpsafe.sim.experiments.pick_place.cell import PROGRAM, Cell
 from qpsafe.sim.experiments.pick_place.people import load_people
+from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.experiments.shared.programmed import Programmed
 from qpsafe.sim.stories.actor import Actor
 from qpsafe.sim.world.scene import Scene, build_scene
@@ -26,8 +27,9 @@ SETTLE = 1.0  # a run goes on for this long after its last release, so that the 
 
 
 @dataclass
-class PickPlaceSettings(Programmed):
-    """Everything that defines one run; equal settings give bit-identical logs (wall times aside).
+class PickPlaceSettings(Programmed, Control):
+    """Everything that defines one run; equal settings give bit-identical logs (wall times aside). Tasks, thresholds,
+    evasion and metrics of one's own are those of `Control`.
 
     Attributes:
         robot: The robot, with spots.

@@ -1,4 +1,4 @@
-"""Snapshots like the source's Fig. 14 (a) to (h): found by what happened in a run, drawn into one picture."""
+"""Snapshots like the paper's Fig. 14 (a) to (h): found by what happened in a run, drawn into one picture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLOURS = {"low": "#2e8b4a", "medium": "#c99700", "high": "#c0392b"}
 
 
 class Moment(NamedTuple):
-    """A snapshot: its letter in the source's figure, its tick, and what it shows."""
+    """A snapshot: its letter in the paper's figure, its tick, and what it shows."""
 
     letter: str
     tick: int
@@ -136,7 +136,14 @@ def draw(experiment: PickPlaceExperiment, run: PickRun, path: Path) -> list[Mome
 
 
 def picture(experiment: PickPlaceExperiment, run: PickRun, tick: int, camera: Camera) -> Any:
-    """The scene as it was at a tick (within `STATES` ticks), (height, width, 3) RGB."""
+    """The scene as it was at a tick (within `STATES` ticks), (height, width, 3) RGB.
+
+    Args:
+        experiment: What was run.
+        run: Its log and states.
+        tick: Which.
+        camera: What it is seen by.
+    """
     state = min(tick // STATES, len(run.states) - 1)
     data = experiment.scene.make_data()
     data.qpos[:] = run.states[state]

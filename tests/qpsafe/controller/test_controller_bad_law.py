@@ -16,7 +16,7 @@ Answer = Callable[[LawProblem], Any]
 
 
 class Law:
-    """The source's law, but for some ticks, in which it answers something else."""
+    """The paper's law, but for some ticks, in which it answers something else."""
 
     def __init__(self, answer: Answer) -> None:
         self.answer = answer

@@ -1,4 +1,4 @@
-"""Table I of the source in closed loop: what is kept and what gives way in low, medium and high danger."""
+"""Table I of the paper in closed loop: what is kept and what gives way in low, medium and high danger."""
 
 import math
 from itertools import pairwise

@@ -63,8 +63,8 @@ def test_an_explanation_says_what_gave_way(run: Any) -> None:
     text = str(tick)
     assert f"CDF_n = {tick.cdf_n:.3f}" in text
     assert "  1 point, CDF_n" in text
-    assert "task 1: activation" in text
-    assert "task 2: activation" in text
+    assert "position of tcp: activation" in text
+    assert "orientation of tcp: activation" in text
     assert len(re.findall("QP of weight", text)) == len(tick.residuals) >= 1
 
 

@@ -1,4 +1,4 @@
-"""The compiled closed form against eqs. (1) to (5), written straight from the source and integrated with 30 digits.
+"""The compiled closed form against eqs. (1) to (5), written straight from the paper and integrated with 30 digits.
 
 The oracle shares nothing with the kernel: Gauss-Legendre with 24 nodes on pieces of l in [0, 1] that shrink by a factor
 of 4 towards the two places where the integrand is sharp, the nearest point of the link and the slowest one.

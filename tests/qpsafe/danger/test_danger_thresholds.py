@@ -1,4 +1,4 @@
-"""Thresholds of other robots: the source's, carried over by a rule."""
+"""Thresholds of other robots: the paper's, carried over by a rule."""
 
 from __future__ import annotations
 

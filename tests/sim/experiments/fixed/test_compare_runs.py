@@ -1,4 +1,4 @@
-"""Whole runs: the QP form of the law against the source's own, in closed loop with the plant."""
+"""Whole runs: the QP form of the law against the paper's own, in closed loop with the plant."""
 
 import numpy as np
 

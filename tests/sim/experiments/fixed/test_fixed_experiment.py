@@ -1,4 +1,4 @@
-"""The source's first experiment, whole: what it must show, checked on the log."""
+"""The paper's first experiment, whole: what it must show, checked on the log."""
 
 from dataclasses import fields, replace
 from itertools import pairwise

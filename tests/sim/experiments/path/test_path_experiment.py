@@ -1,4 +1,4 @@
-"""The source's second experiment, shortened: one approach from the front while the tool follows its line."""
+"""The paper's second experiment, shortened: one approach from the front while the tool follows its line."""
 
 import json
 from dataclasses import fields, replace
@@ -49,7 +49,7 @@ def test_the_run_has_every_regime_and_phase(strict: PathRun) -> None:
 def test_orientation_error_vanishes_with_strict_and_stays_with_the_null_space_law(
     strict: PathRun, nullspace: PathRun
 ) -> None:
-    """On the line in low danger at constant speed; the source reports the latter in its section VI-B."""
+    """On the line in low danger at constant speed; the paper reports the latter in its section VI-B."""
     assert figures(strict, ROBOT).line_orientation < 1e-4
     assert figures(nullspace, ROBOT).line_orientation > 1e-2
 

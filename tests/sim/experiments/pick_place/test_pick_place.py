@@ -1,4 +1,4 @@
-"""The source's third experiment: screws are conserved, events happen once, equal settings give equal runs."""
+"""The paper's third experiment: screws are conserved, events happen once, equal settings give equal runs."""
 
 import json
 from collections import Counter
@@ -176,7 +176,7 @@ def test_programs_that_cannot_be_done_are_refused_before_the_run(tmp_path: Path)
 
 @pytest.mark.slow
 def test_ten_cycles_with_both_people() -> None:
-    """The source's demonstration: all screws delivered, nobody touched, and Fig. 14 has all its pictures."""
+    """The paper's demonstration: all screws delivered, nobody touched, and Fig. 14 has all its pictures."""
     experiment = PickPlaceExperiment(ROBOT)
     run = experiment.run()
     found = figures(run)
