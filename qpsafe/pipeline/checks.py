@@ -134,16 +134,30 @@ def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
     return spots
 
 
+def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """What a part of another making answered, as float64 of this shape; its own array if it may be.
+
+    Raises:
+        TypeError: Text, something complex, masked or no numbers at all.
+        ValueError: Another shape.
+    """
+    array = value
+    if not (type(array) is np.ndarray and array.dtype is _FLOAT):
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or np.ma.is_masked(value):
+            what = "of masked values" if array.dtype.kind in "fiu" else f"of {array.dtype}"
+            raise TypeError(f"{whose} is not an array of real numbers but {what}")
+        array = array.astype(float)
+    if array.shape != shape:
+        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
+    return array
+
+
 def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
     """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be."""
     if not isinstance(result, LawResult):
         raise TypeError(f"the law returned {type(result).__name__}, expected a LawResult")
-    qd = result.qd
-    if not (type(qd) is np.ndarray and qd.dtype is _FLOAT):
-        qd = np.asarray(qd)
-    if qd.shape != q.shape or qd.dtype.kind not in "fiu":
-        raise ValueError(f"the law returned a velocity of shape {qd.shape}, {qd.dtype}, expected {len(q)} real numbers")
-    qd = np.asarray(qd, dtype=float)
+    qd = reals("the law's velocity", result.qd, q.shape)
     if not _all_below(qd, ABSURD_STEP / dt):  # without limits nothing else would stop it
         raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
     return qd

@@ -21,7 +21,7 @@ from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.pipeline.checks import check_command, checked_velocity
+from qpsafe.pipeline.checks import check_command, checked_velocity, reals
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.tasks.task import PoseTask
 
@@ -200,11 +200,10 @@ class Resolve:
         """Write down what parts of another making answered."""
         ends = [0, *accumulate(counts)]
         for k, clik in asked.items():
-            rows = slice(ends[k], ends[k + 1])
-            if np.shape(clik.jacobian) != cut.A[rows].shape or np.shape(clik.error) != (counts[k],):
-                shapes = f"{np.shape(clik.jacobian)}, {np.shape(clik.velocity)}, {np.shape(clik.error)}"
-                raise ValueError(f"task {k + 1} gave Jacobian, velocity and error of shapes {shapes}")
-            cut.A[rows], cut.b[rows], cut.e[rows] = clik
+            rows, count = slice(ends[k], ends[k + 1]), (counts[k],)
+            cut.A[rows] = reals(f"the Jacobian of task {k + 1}", clik.jacobian, (counts[k], cut.A.shape[1]))
+            cut.b[rows] = reals(f"the velocity of task {k + 1}", clik.velocity, count)
+            cut.e[rows] = reals(f"the error of task {k + 1}", clik.error, count)
         if box is not None:
             cut.bounds[0], cut.bounds[1] = box.lower, box.upper
             cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
