@@ -17,6 +17,7 @@ from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
+from qpsafe.limits import KINDS, Box, JointLimits
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
@@ -29,6 +30,8 @@ _FLOAT = np.dtype(np.float64)
 
 #: A law that moves a joint by more than this in one tick is broken [rad].
 ABSURD_STEP = 1e3
+#: Limits of another making may go beyond what their numbers allow by this, for rounding [rad/s].
+BEYOND = 1e-9
 #: A tick that is longer is meant in other units [s].
 LONGEST_TICK = 0.1
 
@@ -151,6 +154,29 @@ def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float
     if array.shape != shape:
         raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
     return array
+
+
+def checked_box(box: Any, limits: JointLimits, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:
+    """The box (n,) that limits of another making gave at q, q̇, if it keeps to their own numbers.
+
+    Raises:
+        TypeError, ValueError: It is none, empty, or goes beyond what the numbers allow.
+    """
+    if not isinstance(box, Box):
+        raise TypeError(f"the limits gave {type(box).__name__}, expected a Box")
+    box = Box(*(reals(f"the limits' {key}", value, q.shape) for key, value in box._asdict().items()))
+    kinds = np.array(box[2:])
+    if not ((kinds >= 0) & (kinds < len(KINDS)) & (kinds == np.floor(kinds))).all():
+        raise ValueError(f"the limits name limits by codes that there are not: {kinds}")
+    if not (box.lower <= box.upper).all():  # false for NaN
+        raise ValueError(f"the limits leave nothing or are not finite: {box.lower} to {box.upper}")
+    rates = limits.max_velocity, limits.max_acceleration
+    most = JointLimits(limits.lower, limits.upper, *rates, limits.dt, limits.return_speed).box(q, qd)
+    beyond = np.flatnonzero(~((box.lower >= most.lower - BEYOND) & (box.upper <= most.upper + BEYOND)))
+    if len(beyond):
+        numbers = ", ".join(str(i + 1) for i in beyond)
+        raise ValueError(f"the limits go beyond their own numbers, joints by number: {numbers}")
+    return box
 
 
 def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.pipeline.checks import check_command, checked_velocity, reals
+from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.tasks.task import PoseTask
 
@@ -147,6 +147,8 @@ class Resolve:
         plain = type(limits) is JointLimits and limits.max_jerk is None
         if asked or not plain:
             box = None if plain or limits is None else limits.box(state.q, qd, qdd)
+            if limits is not None and type(limits) is not JointLimits:
+                box = checked_box(box, limits, state.q, qd)
             self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
         ours = self._ours and limits is not None and not soft

@@ -71,6 +71,47 @@ def spoilt_loop(run: Any, robot: Any, spoiler: Spoiler) -> Any:
     )
 
 
+BOXES: dict[str, Any] = {  # of the right one at a tick
+    "None": lambda box: None,
+    "a tuple": tuple,
+    "NaN": lambda box: box._replace(lower=np.full(6, np.nan)),
+    "everything": lambda box: box._replace(lower=np.full(6, -np.inf), upper=np.full(6, np.inf)),
+    "a number": lambda box: box._replace(upper=0.3),
+    "short": lambda box: box._replace(upper=box.upper[1:]),
+    "empty": lambda box: box._replace(lower=box.upper, upper=box.lower),
+    "faster": lambda box: box._replace(upper=box.upper + np.eye(6)[3] * 1e-6),
+    "standstill": lambda box: box._replace(lower=np.zeros(6), upper=np.zeros(6)),
+    "codes": lambda box: box._replace(upper_kind=np.full(6, 5)),
+    "codes below": lambda box: box._replace(sacrificed=np.full(6, -1)),
+    "text": lambda box: box._replace(lower=box.lower.astype(str)),
+}
+
+
+@pytest.mark.parametrize("law", [None, qpsafe.NullspaceLaw()])
+@pytest.mark.parametrize("kind", BOXES)
+def test_a_box_beyond_the_numbers_of_its_limits_is_a_fault(run: Any, irb140: Any, kind: str, law: Any) -> None:
+    """`run` watches that no command leaves the robot's limits."""
+
+    class Own(qpsafe.JointLimits):
+        change = staticmethod(lambda box: box)
+
+        def box(self, q: Any, qd: Any, qdd: Any = None) -> Any:
+            return Own.change(super().box(q, qd, qdd))
+
+    numbers = irb140.lower, irb140.upper, irb140.max_velocity, irb140.max_acceleration
+    loop = run(law, limits=Own(*numbers))
+    for _ in range(30):
+        assert loop.step(near(loop)).status in ("ok", "degraded")
+    assert np.abs(loop.qd).max() > 0.2  # too fast to stand still at the next tick
+    Own.change = staticmethod(BOXES[kind])
+    tick = loop.step(near(loop))
+    assert tick.status == "fault"
+    assert "limits" in tick.messages[0]
+    assert str(tick)
+    Own.change = staticmethod(lambda box: box._replace(upper=np.nextafter(box.upper, -1.0)))
+    assert loop.step(near(loop)).status in ("ok", "degraded")  # narrower, and so they may be
+
+
 def near(loop: Any) -> np.ndarray:
     return loop.robot.pose("tcp", loop.q)[:3, 3] + np.array([[0.2, 0.02, 0.0], [0.3, 0.1, 0.0], [0.4, 0.0, 0.1]])
 
