@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.rotation import log3
 from qpsafe.tasks.task import Misfit, PoseTask
 from qpsafe.tasks.trajectory import Sample, Trajectory
@@ -40,9 +39,7 @@ class FrameTask(PoseTask):
     name = "frame"
 
     def __init__(self, frame: str, trajectory: Trajectory, gain: float = 1.0, rows: Sequence[int] = ALL) -> None:
-        if not (len(rows) and set(rows) <= set(ALL) and list(rows) == sorted(set(rows))):
-            raise ConfigurationError(type(self).__name__, "rows", rows, "some of 0 to 5, in increasing order")
-        self.rows = tuple(int(row) for row in rows)
+        self.__dict__["rows"] = rows  # checked next
         super().__init__(frame, trajectory, gain)
 
     def __repr__(self) -> str:

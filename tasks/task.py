@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -118,9 +119,12 @@ class PoseTask(Task):
         frame: Frame of the robot that is to follow the trajectory.
         trajectory: Where it should be.
         gain: K [1/s].
+
+    Raises:
+        ConfigurationError: A bad gain, or `rows` that are none.
     """
 
-    #: Rows of the geometric Jacobian that the task uses, linear before angular.
+    #: Rows of the geometric Jacobian that the task uses, of 0 to 5 in increasing order, linear before angular.
     rows: tuple[int, ...]
 
     fixed = Task.fixed | {"frame", "frames", "rows"}
@@ -129,11 +133,22 @@ class PoseTask(Task):
         super().__init__(trajectory, gain)
         self.frame = frame
         self.__dict__.setdefault("frames", (frame,))
-        self.__dict__.setdefault("rows", tuple(self.rows))
+        self.__dict__["rows"] = self._checked_rows()  # compiled code does not look whether there is such a row
         first, last = self.rows[0], self.rows[-1]
         self._numbers = np.array(self.rows, dtype=np.int64)
         contiguous = self.rows == tuple(range(first, last + 1))
         self._rows = slice(first, last + 1) if contiguous else list(self.rows)  # a slice is the quicker one
+
+    def _checked_rows(self) -> tuple[int, ...]:
+        given = getattr(self, "rows", None)
+        try:
+            rows = tuple(sorted({operator.index(row) for row in given}))  # type: ignore[union-attr]
+            good = rows == tuple(given) and len(rows) > 0 and 0 <= rows[0] <= rows[-1] < 6  # type: ignore[arg-type]
+        except TypeError:
+            good = False
+        if not good:
+            raise ConfigurationError(type(self).__name__, "rows", given, "some of 0 to 5, in increasing order")
+        return rows
 
     def value(self, state: RobotState) -> NDArray[np.float64]:
         """Pose of the frame (4, 4), world frame [m]."""

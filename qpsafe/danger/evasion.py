@@ -116,7 +116,7 @@ class Evasion:
         self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
         for array in (self._mass, self._damping, self._A, self._B):
             array.flags.writeable = False
-        self.velocity = np.zeros(n)
+        self._velocity = np.zeros(n)
 
     def __repr__(self) -> str:
         return call(self, mass=np.diag(self._mass), damping=np.diag(self._damping), dt=self._dt)
@@ -141,12 +141,40 @@ class Evasion:
         """Sample time [s]."""
         return self._dt
 
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """q̇0 (n,) [rad/s] of the last step, which the next one goes on from; another one is copied."""
+        return self._velocity
+
+    @velocity.setter
+    def velocity(self, velocity: ArrayLike) -> None:
+        self._velocity = self._vector("velocity", velocity)
+
     def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s]."""
-        velocity = np.empty(len(self.velocity))
-        filter_by(self._A, self._B, self.velocity, sigma, velocity)
-        self.velocity = velocity
+        """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s].
+
+        Raises:
+            ConfigurationError: σ is not n finite numbers.
+        """
+        velocity = np.empty(len(self._velocity))
+        filter_by(self._A, self._B, self._velocity, self._vector("sigma", sigma), velocity)
+        self._velocity = velocity
         return velocity
+
+    def remember(self, velocity: NDArray[np.float64]) -> None:
+        """Take what compiled code has computed for a step (n,) [rad/s], finite."""
+        self._velocity = velocity.copy()
+
+    def _vector(self, key: str, value: ArrayLike) -> NDArray[np.float64]:
+        """A copy as n finite numbers; compiled code does not look at sizes."""
+        shape = self._velocity.shape
+        try:
+            vector = np.array(value, dtype=float)
+        except (TypeError, ValueError):
+            vector = np.full(shape, np.nan)
+        if vector.shape != shape or not np.isfinite(vector).all():
+            raise ConfigurationError("Evasion", key, value, f"{shape[0]} finite numbers")
+        return vector
 
     @property
     def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -155,7 +183,7 @@ class Evasion:
 
     def reset(self) -> None:
         """Forget the past: q̇0 = 0."""
-        self.velocity = np.zeros_like(self.velocity)
+        self._velocity = np.zeros_like(self._velocity)
 
 
 def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:

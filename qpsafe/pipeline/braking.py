@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.danger.evasion import Evasion
 from qpsafe.errors import in_words
 from qpsafe.limits import Box, JointLimits
+from qpsafe.pipeline.checks import reals
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def brake(limits: JointLimits, evasion: Evasion, q: Array, qd: Array) -> Braked:
     none = np.zeros(len(q))
     messages: tuple[str, ...] = ()
     try:
-        qd0 = np.array(evasion.step(none))  # no danger is known: what was known fades
+        qd0 = reals("the evasion's velocity", evasion.step(none), none.shape).copy()  # no danger is known: it fades
     except Exception as error:  # an evasion of another making
         qd0, messages = none, (in_words(error),)
     return Braked(slower(limits, qd), limits.box(q, qd), qd0, messages)

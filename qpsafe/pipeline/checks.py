@@ -17,6 +17,7 @@ from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
+from qpsafe.limits import KINDS, Box, JointLimits
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
@@ -29,6 +30,8 @@ _FLOAT = np.dtype(np.float64)
 
 #: A law that moves a joint by more than this in one tick is broken [rad].
 ABSURD_STEP = 1e3
+#: Limits of another making may go beyond what their numbers allow by this, for rounding [rad/s].
+BEYOND = 1e-9
 #: A tick that is longer is meant in other units [s].
 LONGEST_TICK = 0.1
 
@@ -153,6 +156,48 @@ def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
     return spots
 
 
+def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """What a part of another making answered, as float64 of this shape; its own array if it may be.
+
+    Raises:
+        TypeError: Text, something complex, masked or no numbers at all.
+        ValueError: Another shape.
+    """
+    array = value
+    if not (type(array) is np.ndarray and array.dtype is _FLOAT):
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or np.ma.is_masked(value):
+            what = "of masked values" if array.dtype.kind in "fiu" else f"of {array.dtype}"
+            raise TypeError(f"{whose} is not an array of real numbers but {what}")
+        array = array.astype(float)
+    if array.shape != shape:
+        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
+    return array
+
+
+def checked_box(box: Any, limits: JointLimits, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:
+    """The box (n,) that limits of another making gave at q, q̇, if it keeps to their own numbers.
+
+    Raises:
+        TypeError, ValueError: It is none, empty, or goes beyond what the numbers allow.
+    """
+    if not isinstance(box, Box):
+        raise TypeError(f"the limits gave {type(box).__name__}, expected a Box")
+    box = Box(*(reals(f"the limits' {key}", value, q.shape) for key, value in box._asdict().items()))
+    kinds = np.array(box[2:])
+    if not ((kinds >= 0) & (kinds < len(KINDS)) & (kinds == np.floor(kinds))).all():
+        raise ValueError(f"the limits name limits by codes that there are not: {kinds}")
+    if not (box.lower <= box.upper).all():  # false for NaN
+        raise ValueError(f"the limits leave nothing or are not finite: {box.lower} to {box.upper}")
+    rates = limits.max_velocity, limits.max_acceleration
+    most = JointLimits(limits.lower, limits.upper, *rates, limits.dt, limits.return_speed).box(q, qd)
+    beyond = np.flatnonzero(~((box.lower >= most.lower - BEYOND) & (box.upper <= most.upper + BEYOND)))
+    if len(beyond):
+        numbers = ", ".join(str(i + 1) for i in beyond)
+        raise ValueError(f"the limits go beyond their own numbers, joints by number: {numbers}")
+    return box
+
+
 def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
     """The velocity a law returned, if the robot at q could be sent it; the law's own array if it may be.
 
@@ -163,12 +208,7 @@ def checked_velocity(result: LawResult, q: NDArray[np.float64], dt: float) -> ND
     """
     if not isinstance(result, LawResult):
         raise TypeError(f"the law returned {type(result).__name__}, expected a LawResult")
-    qd = result.qd
-    if not (type(qd) is np.ndarray and qd.dtype is _FLOAT):
-        qd = np.asarray(qd)
-    if qd.shape != q.shape or qd.dtype.kind not in "fiu":
-        raise ValueError(f"the law returned a velocity of shape {qd.shape}, {qd.dtype}, expected {len(q)} real numbers")
-    qd = np.asarray(qd, dtype=float)
+    qd = reals("the law's velocity", result.qd, q.shape)
     if not _all_below(qd, ABSURD_STEP / dt):  # without limits nothing else would stop it
         raise ValueError(f"the law returned a velocity that is not finite or absurd: {qd}")
     return qd

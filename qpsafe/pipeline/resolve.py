@@ -21,7 +21,7 @@ from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.pipeline.checks import check_command, checked_velocity
+from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.tasks.task import PoseTask
 
@@ -147,6 +147,8 @@ class Resolve:
         plain = type(limits) is JointLimits and limits.max_jerk is None
         if asked or not plain:
             box = None if plain or limits is None else limits.box(state.q, qd, qdd)
+            if limits is not None and type(limits) is not JointLimits:
+                box = checked_box(box, limits, state.q, qd)
             self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
         ours = self._ours and limits is not None and not soft
@@ -200,11 +202,10 @@ class Resolve:
         """Write down what parts of another making answered."""
         ends = [0, *accumulate(counts)]
         for k, clik in asked.items():
-            rows = slice(ends[k], ends[k + 1])
-            if np.shape(clik.jacobian) != cut.A[rows].shape or np.shape(clik.error) != (counts[k],):
-                shapes = f"{np.shape(clik.jacobian)}, {np.shape(clik.velocity)}, {np.shape(clik.error)}"
-                raise ValueError(f"task {k + 1} gave Jacobian, velocity and error of shapes {shapes}")
-            cut.A[rows], cut.b[rows], cut.e[rows] = clik
+            rows, count = slice(ends[k], ends[k + 1]), (counts[k],)
+            cut.A[rows] = reals(f"the Jacobian of task {k + 1}", clik.jacobian, (counts[k], cut.A.shape[1]))
+            cut.b[rows] = reals(f"the velocity of task {k + 1}", clik.velocity, count)
+            cut.e[rows] = reals(f"the error of task {k + 1}", clik.error, count)
         if box is not None:
             cut.bounds[0], cut.bounds[1] = box.lower, box.upper
             cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
+from qpsafe.pipeline.checks import reals
 from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
 from qpsafe.robot.wire import Wire
 from qpsafe.sensing.detection import BadInput, as_floats, as_points, plausible, refuse, refuse_points
@@ -76,6 +77,7 @@ class Sense:
         given["weights"] = (field.static, field.kinetic, field.gamma, field.floor) if ours else (nan,) * 4
         given["A"], given["B"] = evasion.matrices if ours else np.zeros((2, robot.nq, robot.nq))
         counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]
+        self._still = np.zeros(robot.nq)
         self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
         self._blocks = pack(self._sizes, given, given)
         self._work = np.empty(work_size(self._sizes, counts[0]))
@@ -105,7 +107,7 @@ class Sense:
         return self._by_distances(q, qd, distances, ages)
 
     def _by_distances(self, q: Array, qd: Array, distances: Array, ages: ArrayLike | None) -> Seen:
-        sensing, _, evasion = self.parts
+        sensing = self.parts[0]
         if sensing is None:
             raise BadInput("distances are given but the robot has no spots")
         k = len(sensing.fresh)
@@ -114,7 +116,7 @@ class Sense:
         points, links, danger, vectors = np.empty((k, 3)), np.empty(k, np.int64), np.empty(k), np.empty((k, 3))
         qd0 = np.empty(len(q))
         count, dead, out, cdf_n = sense_readings(
-            q, qd, distances, sensing.as_ages(ages), *self._blocks, *sensing.memory, evasion.velocity, self._work,
+            q, qd, distances, sensing.as_ages(ages), *self._blocks, *sensing.memory, self._before, self._work,
             points, links, danger, vectors, qd0,
         )  # fmt: skip
         if count < 0:
@@ -131,13 +133,20 @@ class Sense:
         given = as_points(value)
         p = len(given)
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
-        qd0, work, before = np.empty(len(q)), np.empty(work_size(self._sizes, p)), self.parts[2].velocity
-        count, cdf_n = sense_points(q, qd, given, *self._blocks, before, work, points, links, danger, vectors, qd0)
+        qd0, work = np.empty(len(q)), np.empty(work_size(self._sizes, p))
+        count, cdf_n = sense_points(
+            q, qd, given, *self._blocks, self._before, work, points, links, danger, vectors, qd0
+        )  # fmt: skip
         if count == -1:
             refuse(q, qd, self._robot)
         if count < 0:
             refuse_points(points)
         return self._ended(Seen(points, links, danger, vectors, cdf_n, qd0), work, 0)
+
+    @property
+    def _before(self) -> Array:
+        """q̇0 of the last tick (n,) [rad/s], where the compiled call needs it."""
+        return self.parts[2].velocity if self._ours[1] else self._still
 
     def _ended(self, seen: Seen, work: Array, moving: int) -> Seen:
         """What is left to do: the stages of another making, and to remember q̇0."""
@@ -147,7 +156,7 @@ class Sense:
         elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
             raise BadInput(_NOT_FINITE)
         else:
-            evasion.velocity = seen.qd0.copy()
+            evasion.remember(seen.qd0)
         return seen
 
     def _asked(self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int) -> Seen:
@@ -157,16 +166,17 @@ class Sense:
         wire = Wire(*work[memory:a].reshape(4, m, 3).copy())
         velocities = work[a + n : a + n + 3 * moving].reshape(moving, 3).copy() if moving else None
         values, gradient = field.evaluate(seen.points, wire, velocities)  # (1)-(5)
-        torque, danger, vectors = np.empty(n), np.array(values, dtype=float), np.array(gradient, dtype=float)
-        if not (danger.shape == (len(seen.points),) and vectors.shape == seen.points.shape):
-            raise ValueError(f"the field gave values and gradients of shapes {danger.shape} and {vectors.shape}")
+        torque, danger = np.empty(n), reals("the field's value", values, seen.danger.shape).copy()
+        vectors = np.array(reals("the field's gradient", gradient, seen.points.shape), order="C")
         cdf_n = push_vectors(  # (6), (8), (14), (15)
             danger, seen.links, work[:memory], self._robot.ends, *self._robot.wire_indices,
             vectors, torque,
         )  # fmt: skip
         if not isfinite(cdf_n):
             raise BadInput(_NOT_FINITE)
-        qd0 = np.array(evasion.step(torque), dtype=float)  # (16)
+        qd0 = reals("the evasion's velocity", evasion.step(torque), torque.shape).copy()  # (16)
+        if not np.isfinite(qd0).all():
+            raise ValueError(f"the evasion's velocity is not finite: {qd0}")
         return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)
 
 

@@ -10,7 +10,7 @@ numbers: then the calls stop at the points.
 
 from __future__ import annotations
 
-from math import nan
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -111,6 +111,9 @@ def _evade(
     )  # fmt: skip
     # -> evasive velocity (16)
     _filter_by(view(f, i[A], (n, n)), view(f, i[B], (n, n)), before, torque, qd0)
+    for j in range(n):
+        if not isfinite(qd0[j]):
+            cdf_n = nan
     return cdf_n
 
 

@@ -1,6 +1,7 @@
 """Tasks: errors, Jacobians and closed-loop inverse kinematics, checked by one shared finite-difference test."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +15,7 @@ from qpsafe.tasks.joint import JointTask, PostureTask
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.rotation import euler_zyx, exp3, log3
-from qpsafe.tasks.task import Task
+from qpsafe.tasks.task import PoseTask, Task
 from qpsafe.tasks.trajectory import FixedJoints, FixedPose, Sample, Trajectory
 
 robot = qpsafe.load_robot("irb140")
@@ -209,3 +210,16 @@ def test_tasks_that_cannot_be_are_refused_by_name(bad: Callable[[], object], key
 
 def given(task: Task) -> qpsafe.SafetyController:
     return qpsafe.SafetyController(robot, [task])
+
+
+@pytest.mark.parametrize(
+    "rows", [(), (6,), (-1,), (0, 9), (0, 10**6), (1, 0), (2, 2), (0.0,), (1.5,), "12", 3, None, [[0]]]
+)
+@pytest.mark.parametrize("kind", [PositionTask, OrientationTask, FrameTask, "derived"])
+def test_rows_that_a_pose_does_not_have_are_refused(kind: Any, rows: Any) -> None:
+    """However they are given: compiled code would read beyond the pose, or another row than is meant."""
+    body = {"rows": rows, "error": None}
+    own = type("Own", (PoseTask if kind == "derived" else kind,), body if kind is not FrameTask else {})
+    options = {"rows": rows} if kind is FrameTask else {}
+    with pytest.raises(ConfigurationError, match="rows"):
+        own("tcp", FixedPose(np.eye(4)), 1.0, **options)

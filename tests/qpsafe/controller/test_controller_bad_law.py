@@ -59,6 +59,7 @@ FAULTY: dict[str, tuple[Answer, str]] = {
     "nothing": (lambda _: LawResult(None), "object"),  # type: ignore[arg-type]
     "text": (lambda _: LawResult(np.array(["0"] * N)), "<U1"),
     "complex": (lambda p: LawResult(p.qd0 + 0j), "complex128"),
+    "masked": (lambda p: LawResult(np.ma.masked_array(p.qd0, p.qd0 == p.qd0[0])), "masked"),
 }
 
 

@@ -80,3 +80,23 @@ def test_vectors_are_summed_link_by_link() -> None:
 def test_matrices_that_are_not_positive_definite_are_refused(bad: object) -> None:
     with pytest.raises(ConfigurationError, match="damping"):
         Evasion(1.0, bad, 3)
+
+
+@given(st.sampled_from([0, 1, 2, 3, 5, 7, 60, 10_000]), st.integers(0, 2), st.sampled_from([0.1, np.nan, np.inf]))
+def test_what_is_no_vector_of_the_joints_never_reaches_compiled_code(size: int, ndim: int, value: float) -> None:
+    """Compiled code does not look at sizes: it would read and write beyond the ends."""
+    evasion, array = Evasion(4.0, 20.0, 4), np.full((size,) + (1,) * ndim, value)
+    before = evasion.step(np.ones(4)).copy()
+    with pytest.raises(ConfigurationError):
+        evasion.velocity = array
+    with pytest.raises(ConfigurationError):
+        evasion.step(array)
+    assert np.array_equal(evasion.velocity, before)
+
+
+def test_the_velocity_can_be_set_and_is_copied() -> None:
+    evasion, given_ = Evasion(4.0, 20.0, 4), np.array([1, 2, 3, 4], dtype=np.float32)
+    evasion.velocity = given_
+    given_[:] = 0.0
+    faded = evasion.step(np.zeros(4))
+    assert faded == pytest.approx(np.exp(-20.0 / 4.0 * 0.004) * np.array([1.0, 2.0, 3.0, 4.0]))
