@@ -82,16 +82,13 @@ def _robot_jacobians(rng: np.random.Generator) -> Iterator[tuple[str, _Matrix, _
     robot = load_robot("irb140")
     while True:
         for kind, joint in _SINGULAR.items():
-            q = rng.uniform(robot.lower, robot.upper)
-            if joint == 4:
-                q[4] = 0.0  # axes 4 and 6 in line
-            elif joint == 2:
-                q[2] = -np.pi / 2.0  # forearm in line with the upper arm
-            J = robot.jacobian("tcp", q)
-            while any(_nearly_singular(part) for part in (J[:3], J[3:], J)):
-                q[:2] = rng.uniform(robot.lower[:2], robot.upper[:2])
-                q[3] = rng.uniform(robot.lower[3], robot.upper[3])
-                q[2 if joint != 2 else 4] = rng.uniform(-1.5, 0.8)
+            J = np.zeros((6, robot.nq))
+            while not J.any() or any(_nearly_singular(part) for part in (J[:3], J[3:], J)):
+                q = rng.uniform(robot.lower, robot.upper)
+                if joint == 4:
+                    q[4] = 0.0  # axes 4 and 6 in line
+                elif joint == 2:
+                    q[2] = -np.pi / 2.0  # forearm in line with the upper arm
                 J = robot.jacobian("tcp", q)
             yield kind, J[:3], J[3:]
 
