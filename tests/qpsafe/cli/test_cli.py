@@ -127,7 +127,7 @@ def test_compare_is_honest_in_its_exit_code() -> None:
 @pytest.mark.parametrize(
     ("options", "sample"),
     [
-        ([], (7_000, 25.0)),
+        ([], (10_000, 25.0)),
         (["--full"], (10_000, 60.0)),
         (["--states", "54"], (54, 25.0)),
         (["--full", "--duration", "3"], (10_000, 3.0)),
