@@ -223,6 +223,8 @@ class Resolve:
         answer = checked_velocity(result, state.q, self._dt)
         command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
         check_command(command, self._dt)
+        if type(result) is LawResult:  # the law's own array may be its memory of the next tick
+            result = LawResult(answer.copy(), result.status, result.regimes)
         return Resolved(command, excess, result.status == SOLVED, result=result, frozen=made._frozen)
 
 
