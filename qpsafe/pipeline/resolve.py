@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.hqp.own.regimes import layout_for
+from qpsafe.hqp.own.regimes import MOST_LAYOUTS, layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
@@ -141,6 +141,8 @@ class Resolve:
         counts, asked = self._take(state, samples)
         made = self._layouts.get(counts)
         if made is None:
+            if len(self._layouts) >= MOST_LAYOUTS:  # a task whose rows change for ever
+                self._layouts.clear()
             made = self._layouts[counts] = self._laid_out(counts)
         rows, layout, sizes = made
         command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
