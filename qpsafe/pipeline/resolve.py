@@ -180,7 +180,7 @@ class Resolve:
                 pose, twist = sample.pose, sample.twist
                 if (
                     type(pose) is type(twist) is np.ndarray
-                    and pose.dtype is twist.dtype is _FLOAT
+                    and pose.dtype == twist.dtype == _FLOAT
                     and pose.shape == (4, 4)
                     and twist.shape == (6,)
                 ):

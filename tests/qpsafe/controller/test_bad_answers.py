@@ -1,5 +1,6 @@
 """What a task, a field or an evasion of the user's answers is taken as it is, or the tick is a fault: never guessed."""
 
+import pickle
 import tracemalloc
 from typing import Any
 
@@ -33,6 +34,7 @@ FAIR: dict[str, Any] = {
     "misaligned": lambda a: np.frombuffer(b"x" + a.tobytes(), np.uint8)[1:].view(float).reshape(a.shape),
     "byte order": lambda a: a.astype(">f8"),
     "long double": lambda a: a.astype(np.longdouble),
+    "unpickled": lambda a: pickle.loads(pickle.dumps(a)),
     "unmasked": lambda a: np.ma.masked_array(a),
 }
 PARTS = ("jacobian", "velocity", "error", "value", "gradient", "evasion")
