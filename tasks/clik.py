@@ -47,7 +47,7 @@ def pose_clik(state: RobotState, frame: str, rows: Index, gain: float, sample: A
         None where the sample is not made of plain arrays.
     """
     pose, twist = sample.pose, sample.twist
-    if not (type(pose) is type(twist) is np.ndarray and pose.dtype is twist.dtype is _FLOAT):
+    if not (type(pose) is type(twist) is np.ndarray and pose.dtype == twist.dtype == _FLOAT):
         return None
     if pose.shape != (4, 4) or twist.shape != (6,):
         return None

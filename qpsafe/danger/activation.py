@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.text.words import call
+from qpsafe.text.words import call, counted
 
 
 @dataclass(frozen=True)
@@ -134,9 +134,18 @@ class Activation(Fixed):
         return tuple(result)
 
     def at(self, cdf_n: float) -> Switching:
-        """Switches, activations and the regime's name, in one pass."""
+        """Switches, activations and the regime's name, in one pass.
+
+        Raises:
+            ValueError: A derived class gives what are no activations.
+        """
         if type(self) is not Activation:
-            return Switching(self.switches(cdf_n), self.activations(cdf_n), self.regime(cdf_n))
+            found = tuple([float(a) for a in self.activations(cdf_n)])
+            falling = all(above >= a for above, a in pairwise((1.0, *found, 0.0)))  # false for NaN
+            if not (falling and len(found) == len(self.thresholds)):
+                expected = f"1 >= a_1 >= ... >= 0 for {counted(len(self.thresholds), 'task')}"
+                raise ValueError(f"the activations are {found}, expected {expected}")
+            return Switching(self.switches(cdf_n), found, self.regime(cdf_n))
         if cdf_n <= self.levels[-1].start:  # below the lowest threshold
             return self._calm
         switches, activations = [], []

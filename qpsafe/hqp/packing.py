@@ -69,7 +69,7 @@ def pack(
             matrix, low = np.concatenate(matrices), np.concatenate(lows)
             high = low if hard is None else np.concatenate(highs)
             counts = list(map(len, matrices))
-            plain = matrix.dtype is low.dtype is _FLOAT and counts == list(map(len, lows))
+            plain = matrix.dtype == low.dtype == _FLOAT and counts == list(map(len, lows))
             plain = plain and matrix.ndim == 2 and low.ndim == 1
         except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
             pass

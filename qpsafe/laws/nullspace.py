@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.activation import regime_weights
+from qpsafe.hqp.own.state import HUGE
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.text.words import call
 
@@ -14,7 +15,13 @@ RANK_TOLERANCE = 1e-10
 
 
 def pseudoinverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Moore-Penrose pseudoinverse P(A), (n, rows), of A (rows, n); A may be rank-deficient or have no rows."""
+    """Moore-Penrose pseudoinverse P(A), (n, rows), of A (rows, n); A may be rank-deficient or have no rows.
+
+    Raises:
+        ValueError: A number of A is not finite, or cannot be squared: LAPACK may then never come back.
+    """
+    if not (np.abs(A) < HUGE).all():  # false for NaN
+        raise ValueError(f"a Jacobian has numbers that are not finite, or beyond {HUGE:g}")
     return np.asarray(np.linalg.pinv(A, rcond=RANK_TOLERANCE), dtype=np.float64)
 
 

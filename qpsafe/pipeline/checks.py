@@ -164,7 +164,7 @@ def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float
         ValueError: Another shape.
     """
     array = value
-    if not (type(array) is np.ndarray and array.dtype is _FLOAT):
+    if not (type(array) is np.ndarray and array.dtype == _FLOAT):
         array = np.asarray(value)
         if array.dtype.kind not in "fiu" or np.ma.is_masked(value):
             what = "of masked values" if array.dtype.kind in "fiu" else f"of {array.dtype}"
@@ -220,7 +220,7 @@ def check_command(command: object, dt: float) -> None:
     Raises:
         ValueError: It is not finite, or absurd.
     """
-    if not (type(command) is np.ndarray and command.dtype is _FLOAT and _all_below(command, ABSURD_STEP / dt)):
+    if not (type(command) is np.ndarray and command.dtype == _FLOAT and _all_below(command, ABSURD_STEP / dt)):
         raise ValueError(f"the limits or the barrier lead to a command that is not finite or absurd: {command}")
 
 

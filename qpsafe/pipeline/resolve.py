@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.hqp.own.regimes import layout_for
+from qpsafe.hqp.own.regimes import MOST_LAYOUTS, layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
@@ -141,6 +141,8 @@ class Resolve:
         counts, asked = self._take(state, samples)
         made = self._layouts.get(counts)
         if made is None:
+            if len(self._layouts) >= MOST_LAYOUTS:  # a task whose rows change for ever
+                self._layouts.clear()
             made = self._layouts[counts] = self._laid_out(counts)
         rows, layout, sizes = made
         command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
@@ -178,7 +180,7 @@ class Resolve:
                 pose, twist = sample.pose, sample.twist
                 if (
                     type(pose) is type(twist) is np.ndarray
-                    and pose.dtype is twist.dtype is _FLOAT
+                    and pose.dtype == twist.dtype == _FLOAT
                     and pose.shape == (4, 4)
                     and twist.shape == (6,)
                 ):
@@ -223,6 +225,8 @@ class Resolve:
         answer = checked_velocity(result, state.q, self._dt)
         command, excess = made.box.admit(answer) if made.box else (answer.copy(), 0.0)
         check_command(command, self._dt)
+        if type(result) is LawResult:  # the law's own array may be its memory of the next tick
+            result = LawResult(answer.copy(), result.status, result.regimes)
         return Resolved(command, excess, result.status == SOLVED, result=result, frozen=made._frozen)
 
 

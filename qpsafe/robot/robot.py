@@ -211,7 +211,7 @@ class Robot(Fixed):
         Raises:
             ConfigurationError: The shape is another one, or these are no numbers.
         """
-        if type(values) is np.ndarray and values.dtype is _FLOAT and values.shape == (self.nq,):  # the usual case
+        if type(values) is np.ndarray and values.dtype == _FLOAT and values.shape == (self.nq,):  # the usual case
             return values
         try:
             array = np.asarray(values, dtype=np.float64)

@@ -142,7 +142,7 @@ def find_nearest(points: Array, r0: Array, r1: Array, links: Array) -> bool:
 
 def as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """`value` as a float64 array; real numbers only: no text, no bool, nothing complex, None or masked."""
-    if type(value) is np.ndarray and value.dtype is _FLOAT:  # the usual case
+    if type(value) is np.ndarray and value.dtype == _FLOAT:  # the usual case
         return value
     try:
         array = np.asarray(value)

@@ -81,6 +81,8 @@ class Layout(NamedTuple):
     ends: Index
 
 
+#: How many layouts are kept.
+MOST_LAYOUTS = 64
 _layouts: dict[tuple[int, ...], Layout] = {}
 
 
@@ -89,7 +91,7 @@ def layout_for(n: int, counts: Sequence[int]) -> Layout:
     known = _layouts.get((n, *counts))
     if known is not None:
         return known
-    if len(_layouts) >= 64:
+    if len(_layouts) >= MOST_LAYOUTS:
         _layouts.clear()
     m, rows = max(n, *counts), sum(counts) + n
     ends = np.cumsum(counts, dtype=np.int64)

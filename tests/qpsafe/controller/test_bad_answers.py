@@ -1,5 +1,7 @@
 """What a task, a field or an evasion of the user's answers is taken as it is, or the tick is a fault: never guessed."""
 
+import pickle
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -32,6 +34,7 @@ FAIR: dict[str, Any] = {
     "misaligned": lambda a: np.frombuffer(b"x" + a.tobytes(), np.uint8)[1:].view(float).reshape(a.shape),
     "byte order": lambda a: a.astype(">f8"),
     "long double": lambda a: a.astype(np.longdouble),
+    "unpickled": lambda a: pickle.loads(pickle.dumps(a)),
     "unmasked": lambda a: np.ma.masked_array(a),
 }
 PARTS = ("jacobian", "velocity", "error", "value", "gradient", "evasion")
@@ -110,6 +113,47 @@ def test_a_box_beyond_the_numbers_of_its_limits_is_a_fault(run: Any, irb140: Any
     assert str(tick)
     Own.change = staticmethod(lambda box: box._replace(upper=np.nextafter(box.upper, -1.0)))
     assert loop.step(near(loop)).status in ("ok", "degraded")  # narrower, and so they may be
+
+
+@pytest.mark.parametrize("law", [None, qpsafe.NullspaceLaw()])
+@pytest.mark.parametrize(
+    "answer",
+    [(np.nan, np.nan), (1.0, np.nan), (1.5, 1.0), (0.0, 1.0), (1.0, -0.5), (), (1.0,), (1.0,) * 3, "ab", None, (1j, 0)],
+)
+def test_activations_that_are_none_are_a_fault(run: Any, law: Any, answer: Any) -> None:
+    class Own(qpsafe.Activation):
+        answer: Any = (1.0, 1.0)
+
+        def activations(self, cdf_n: float) -> Any:
+            return Own.answer
+
+    loop = run(law, activation=Own())
+    assert loop.step().status == "ok"
+    Own.answer = answer
+    assert loop.step().status == "fault"
+    Own.answer = (1.0, 0.5)
+    assert loop.step().status == "ok"
+
+
+def test_a_task_whose_rows_change_for_ever_does_not_fill_the_memory(run: Any, irb140: Any) -> None:
+    rows = [0]
+
+    class Own(qpsafe.PositionTask):
+        def clik(self, state: Any, sample: Any) -> Clik:
+            rows[0] += 1
+            answer = super().clik(state, sample)
+            return Clik(*(np.resize(part, (rows[0], *part.shape[1:])) for part in answer))
+
+    loop = run(tasks=[Own("tcp", qpsafe.FixedPose(irb140.pose("tcp", irb140.home)))])
+    for _ in range(70):
+        assert loop.step().status == "ok"
+    tracemalloc.start()
+    sizes = []
+    for _ in range(150):
+        loop.step()
+        sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert min(sizes[-70:]) < max(sizes[:70])  # it is let go
 
 
 def near(loop: Any) -> np.ndarray:

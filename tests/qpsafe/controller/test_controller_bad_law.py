@@ -171,6 +171,24 @@ def test_a_law_that_writes_into_what_it_was_given_changes_nothing(run: Any, limi
     assert np.array_equal(spoilt.feed(None, None).reference.qd, clean.feed(None, None).reference.qd)
 
 
+def test_a_tick_keeps_the_answer_of_a_law_that_uses_its_array_again(run: Any) -> None:
+    memory = np.zeros(N)
+
+    def again(problem: LawProblem) -> LawResult:
+        memory[:] = qpsafe.NullspaceLaw().solve(problem).qd
+        return LawResult(memory)
+
+    law = Law(again)
+    law.spoilt = True
+    loop, ticks, seen = run(law), [], []
+    tip = loop.robot.pose("tcp", loop.q)[:3, 3]
+    for k in range(30):
+        ticks.append(loop.step(tip[None] + [0.15 + 0.002 * k, 0.02, 0.0]))
+        seen.append(ticks[-1].law.qd.copy())
+    assert np.ptp(seen, axis=0).max() > 0.01
+    assert np.array_equal([tick.law.qd for tick in ticks], seen)
+
+
 def test_what_is_no_exception_passes_through(run: Any) -> None:
     """Ctrl-C must still stop the program."""
     law = Law(raising(KeyboardInterrupt()))

@@ -168,3 +168,14 @@ def test_wrong_law_settings_are_refused() -> None:
     for ratio in (1.0, -3.0, np.nan, np.inf):
         with pytest.raises(ConfigurationError, match="ratio"):
             WeightedLaw(ratio)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.sampled_from([np.inf, -np.inf, np.nan, 1e61, -1e308]))
+def test_a_jacobian_that_is_not_finite_is_refused_at_once(seed: int, rows: int, bad: float) -> None:
+    """LAPACK's singular values of a matrix with infinities may never come; seen with two such rows of five."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(rows, 14))
+    A[rng.random(A.shape) < rng.choice([0.02, 0.5, 1.0])] = bad
+    A[rng.integers(rows), rng.integers(14)] = bad
+    with pytest.raises(ValueError, match="not finite"):
+        pseudoinverse(A)
