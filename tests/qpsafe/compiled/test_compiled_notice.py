@@ -48,5 +48,5 @@ def test_it_says_compiling_if_and_only_if_something_compiles(tmp_path: Path, cac
 
 def test_a_kernel_that_compiles_quickly_needs_no_word(tmp_path: Path) -> None:
     (tmp_path / "kernel.py").write_text(KERNEL)
-    patient = "from qpsafe.danger import compiled\ncompiled.PATIENCE = 1e3\nimport kernel"
+    patient = "from qpsafe.compiled import compiled\ncompiled.PATIENCE = 1e3\nimport kernel"
     assert "compiling" not in start(tmp_path, patient)
