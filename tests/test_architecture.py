@@ -112,3 +112,8 @@ def test_no_room_is_crowded_and_no_module_is_long() -> None:
         str(path.relative_to(ROOT)): len(path.read_text("utf-8").splitlines()) for p in rooms().values() for path in p
     }
     assert {name: length for name, length in lengths.items() if length > 300} == {}
+
+
+def test_no_two_modules_share_a_name_that_says_nothing() -> None:
+    names = [path.stem for inside in rooms().values() for path in inside]
+    assert [name for name in ("reference", "kernel", "timing", "loop") if names.count(name) > 1] == []
