@@ -76,8 +76,8 @@ def irc5_sim(
     from qpsafe.irc5.requests import Requests
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.by_name import experiment_loop
+    from qpsafe.sim.irc5.irc5_loop import Irc5Loop
     from qpsafe.sim.irc5.link import WireFaults
-    from qpsafe.sim.irc5.loop import Irc5Loop
     from qpsafe.sim.irc5.motion import EgmSettings
     from qpsafe.sim.irc5.process import farewell, happenings, run_robot
     from qpsafe.sim.irc5.udp import UdpExchange

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import rows
-from qpsafe.danger.kernel import danger_field
+from qpsafe.danger.link_field import danger_field
 from qpsafe.danger.vector import danger_vectors
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.wire import Wire

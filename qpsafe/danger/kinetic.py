@@ -4,7 +4,7 @@ With r_l = r0 + l d, w = p - r_l, R = |w|, v_l = v0 + l δ, v̂ = v_l/|v_l|, the
 
     H = Σ ∫ v_l·w/R³ + gamma |v_l|/R² dl,    ∂H/∂v0 = ∫ (1-l) (w/R³ + gamma v̂/R²) dl,    ∂H/∂v1 with l for (1-l).
 
-The first term is that of `kernel`. For the second let z = λ + iμ be where R² = L² (l-z)(l-z̄) = 0; the integrals
+The first term is that of `link_field`. For the second let z = λ + iμ be where R² = L² (l-z)(l-z̄) = 0; the integrals
 E_k = ∫ l^k/(|v_l| |l-z|²) dl follow from I = ∫ dl/((l-z) |v_l|) and B = ∫ dl/|v_l|:
 
     E_0 = Im I/μ,    E_1 = Re I + λ E_0,    E_2 = B + 2 λ E_1 - |z|² E_0.
@@ -19,8 +19,8 @@ from math import isfinite, log1p, nan, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row, scale
-from qpsafe.danger import kernel, speed
-from qpsafe.danger.kernel import NODES, WEIGHTS, placed
+from qpsafe.danger import link_field, speed
+from qpsafe.danger.link_field import NODES, WEIGHTS, placed
 from qpsafe.danger.speed import Motion, motion_of, pole_integral
 
 _FAR = (
@@ -38,7 +38,7 @@ def _near(w0: Vector, w1: Vector, d: Vector, motion: Motion, gamma: float) -> tu
     wn = add(w0, t0, u) if R0 < R1 else add(w1, t1, u)  # w⊥, from the nearer end
     hh, ww = dot(wn, wn), dot(w0, w1)
     D = R0 * R1 + ww if ww >= 0.0 else L * L * hh / (R0 * R1 - ww)
-    # ∫ w/R³ = e/D, e = ŵ0 + ŵ1, and ∫ l w/R³ = w⊥/(R1 D) + u (1/R1 - S)/L, S = ∫ 1/R: see `kernel._near`
+    # ∫ w/R³ = e/D, e = ŵ0 + ŵ1, and ∫ l w/R³ = w⊥/(R1 D) + u (1/R1 - S)/L, S = ∫ 1/R: see `link_field._near`
     e = add(scale(sigma / (R0 * R1), wn), -(t0 + t1) * D / (R0 * R1 * sigma), u)
     S = log1p(L * (sigma + L) / D) / L
     g1 = add(scale(1.0 / (R1 * D), wn), (1.0 / R1 - S) / L, u)
@@ -77,7 +77,7 @@ _rows = readable(2)
 
 @entry(
     types.void(_rows, _rows, _rows, _rows, _rows, *[types.float64] * 3, types.Array(types.float64, 4, "C")),
-    kernel,
+    link_field,
     speed,
 )
 def velocity_gradient(

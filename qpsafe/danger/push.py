@@ -9,9 +9,9 @@ import numpy as np
 from numba import types
 
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
-from qpsafe.danger import evasion, field, kernel, speed, vector
+from qpsafe.danger import evasion, field, link_field, speed, vector
 from qpsafe.danger.evasion import act
-from qpsafe.danger.kernel import danger_field
+from qpsafe.danger.link_field import danger_field
 from qpsafe.danger.vector import vector_of
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import cut
@@ -21,7 +21,7 @@ _rows, _ints = readable(2), types.Array(types.int64, 1, "A", readonly=True)
 _weights, _out, _outs = types.UniTuple(types.float64, 3), types.float64[::1], types.float64[:, ::1]
 
 
-USES = (evasion, field, kernel, speed, vector, kinematics)
+USES = (evasion, field, link_field, speed, vector, kinematics)
 
 
 @inline

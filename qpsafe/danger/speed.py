@@ -1,4 +1,4 @@
-"""Integrals over a link that have the speed |v_l|, the root of a quadratic in l, in them, compiled; see `kernel`."""
+"""Integrals over a link with the speed |v_l|, the root of a quadratic in l, compiled: see `link_field`."""
 
 from __future__ import annotations
 

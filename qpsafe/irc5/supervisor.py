@@ -192,7 +192,7 @@ class Supervisor:
         after = TRANSITIONS.get((before, event), before)
         graver = category is not None and (self.category is None or category < self.category)
         bad = event in (Event.DEGRADE, Event.STOP, Event.CUT)
-        news = bad and not self._known(cause) and before is not IDLE
+        news = bad and not self._known(cause)
         if news and after is before and not graver and len(self.causes) >= MOST_CAUSES:
             cause, news = _MORE, _MORE not in self.causes
         if after is before and not graver and not (news and before.severity >= DEGRADED.severity):

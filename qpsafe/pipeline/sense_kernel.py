@@ -25,13 +25,13 @@ from qpsafe.danger.evasion import filter_by
 from qpsafe.danger.push import push_by
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, forward, wire_of
-from qpsafe.sensing import detection, kernel
+from qpsafe.sensing import detection, readings
 from qpsafe.sensing.detection import find_nearest
-from qpsafe.sensing.kernel import take_readings
+from qpsafe.sensing.readings import take_readings
 
 # each is compiled once, for Python and for these calls
 _forward, _wire_of, _filter_by = linked(forward), linked(wire_of), linked(filter_by)
-_take_readings, _push_by = linked(take_readings, *kernel.USES), linked(push_by, *push.USES)
+_take_readings, _push_by = linked(take_readings, *readings.USES), linked(push_by, *push.USES)
 _find_nearest = linked(find_nearest, compiled)
 
 # the block of integers begins with sizes, then tells where each field of the two blocks begins
@@ -127,7 +127,7 @@ _out, _outs, _ints_block = types.float64[::1], types.float64[:, ::1], types.Arra
         types.int64[:, ::1], _outs, types.boolean[::1], _outs, _ints, _outs,
         _any, _out, _outs, _ints, _out, _outs, _out,
     ),
-    kinematics, push, kernel, *push.USES, *kernel.USES,
+    kinematics, push, readings, *push.USES, *readings.USES,
 )  # fmt: skip
 def sense_readings(
     q: Array, qd: Array, distances: Array, ages: Array, f: Array, i: Index,

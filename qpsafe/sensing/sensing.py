@@ -15,7 +15,7 @@ from qpsafe.sensing.detection import BadInput, as_floats
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import HullSet, Obstacle
-from qpsafe.sensing.kernel import take_readings
+from qpsafe.sensing.readings import take_readings
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.spots import SpotArray
 from qpsafe.sensing.velocity import ApproachVelocity

@@ -6,10 +6,10 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
+from qpsafe.sim.experiments.pick_place.pick_loop import PickLoop
 
 if TYPE_CHECKING:
     from qpsafe.laws.problem import Law

@@ -23,9 +23,9 @@ from qpsafe.errors import QpsafeError
 from qpsafe.irc5.axes import axes_of_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments.by_name import experiment_loop
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
+from qpsafe.sim.experiments.pick_place.pick_loop import PickLoop
 from qpsafe.sim.irc5.in_process import Here
-from qpsafe.sim.irc5.loop import Exchange, Irc5Loop
+from qpsafe.sim.irc5.irc5_loop import Exchange, Irc5Loop
 from qpsafe.sim.irc5.motion import EgmSettings
 from qpsafe.sim.irc5.process import RobotRun, farewell, run_robot
 from qpsafe.sim.irc5.udp import UdpExchange

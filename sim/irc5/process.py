@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sim.irc5.irc5_loop import Irc5Loop
 from qpsafe.sim.irc5.link import NO_FAULTS, WireFaults
-from qpsafe.sim.irc5.loop import Irc5Loop
 from qpsafe.sim.irc5.udp import NoAnswerError, UdpExchange
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ class NoAnswerError(QpsafeError, RuntimeError):
 
 
 class UdpExchange:
-    """One robot's end of the wire; see `qpsafe.sim.irc5.loop.Exchange`.
+    """One robot's end of the wire; see `qpsafe.sim.irc5.irc5_loop.Exchange`.
 
     Args:
         joints: How many the robot has, or which of them are external.

@@ -20,10 +20,10 @@ from qpsafe.recovery.recovery import RecoveryRules
 from qpsafe.robot.loader import bundled_robots, load_robot
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
+from qpsafe.sim.experiments.pick_place.pick_loop import PickLoop
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.people.person import Board, Person
 from qpsafe.sim.replay.settings_parts import part_settings, parts_of

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.speed_cap import wire_speed
-from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.sick.cases import CASES, WINDOW, Case, Reaction, Record, Window
 from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.text.words import counted

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.robot.state import RobotState
-from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.experiments.fixed.settings import FixedSettings
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.recording.log import Recorder, RunLog

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.experiments.fixed.experiment import Observer, euler_error, own_errors, pose_error
-from qpsafe.sim.experiments.pick_place.loop import RELEASE, PickEvent, PickLoop, motion
+from qpsafe.sim.experiments.pick_place.pick_loop import RELEASE, PickEvent, PickLoop, motion
 from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.clearance import Furniture
@@ -24,7 +24,7 @@ class PickRun:
     Attributes:
         log: Every signal; errors are against the program, board distances +inf.
         path_time: The program's clock (N,) [s].
-        motion: How fast the robot moves, see `qpsafe.sim.experiments.pick_place.loop.motion`, (N,) [m/s].
+        motion: How fast the robot moves, see `qpsafe.sim.experiments.pick_place.pick_loop.motion`, (N,) [m/s].
         events: What happened to the screws.
         screws: Where each screw is at the end.
         clearance: Smallest distance robot-furniture, every `STATES` ticks, (M,) [m].

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.danger.field import DangerField, danger_vectors
-from qpsafe.danger.kernel import danger_field
+from qpsafe.danger.link_field import danger_field
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.wire import Wire
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from qpsafe.danger.field import DangerField
-from qpsafe.danger.kernel import FAR
+from qpsafe.danger.link_field import FAR
 from qpsafe.robot.wire import Wire
 
 VALUE_TOLERANCE, GRADIENT_TOLERANCE = 1e-10, 1e-8

@@ -95,6 +95,30 @@ def test_giving_way_arrives_without_overshoot(goal: float) -> None:
     assert not made.qd.any()
 
 
+@pytest.mark.parametrize("speed", [0.05, -0.2])
+def test_ramping_in_is_exact_without_catching_up(speed: float) -> None:
+    made = Shaper(LIMITS, ramp_in=0.4, ramp_out=0.05, catch_up=1e-9)
+    made.seed(np.zeros(N))
+    q, qd = np.zeros(N), np.full(N, speed)
+    for _ in range(150):
+        q = q + qd * DT
+        made.follow(q, qd)
+        assert not made.clipped
+        assert np.allclose(made.q, made.weight * q, rtol=0, atol=1e-12)  # seed + w (q - seed)
+    assert made.weight == 1.0
+
+
+def test_giving_way_keeps_half_the_acceleration_for_braking() -> None:
+    made = shaper()
+    speeds = [np.zeros(N)]
+    for _ in range(1500):
+        made.settle(np.array([0.9, -0.9]))
+        speeds.append(np.abs(made.qd))
+    slower = -np.diff(speeds, axis=0)
+    assert (slower <= 0.5 * A_MAX * DT * (1.0 + 1e-9)).all()
+    assert (slower.max(axis=0) > 0.4 * A_MAX * DT).all()  # and no less than it may
+
+
 def test_a_source_that_was_left_behind_is_caught_up_with() -> None:
     made = shaper()
     q, qd = np.zeros(N), np.full(N, 0.1)

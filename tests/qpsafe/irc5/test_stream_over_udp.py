@@ -26,8 +26,8 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sim.experiments.by_name import experiment_loop
 from qpsafe.sim.experiments.path.experiment import PROGRAM as PROGRAM_FILE
 from qpsafe.sim.irc5.compare import StreamProcess, agreement, in_one_process, over_the_wire, stream_process
+from qpsafe.sim.irc5.irc5_loop import Irc5Loop
 from qpsafe.sim.irc5.link import WireFaults
-from qpsafe.sim.irc5.loop import Irc5Loop
 from qpsafe.sim.irc5.motion import EgmSettings
 from qpsafe.sim.irc5.process import happenings, run_robot
 from qpsafe.sim.irc5.udp import NoAnswerError, UdpExchange

@@ -64,6 +64,13 @@ def test_one_reading_in_metres_begins_the_time_anew(spots: Any) -> None:
         assert watch.notes(np.full(20, FARTHEST_READING if near else 42.0), None) == ()
 
 
+def test_points_in_metres_begin_the_time_anew() -> None:
+    watch = UnitWatch(None, DT)
+    for k in range(10 * SECOND):
+        near = k % 200 < 60  # a look falls into these
+        assert watch.notes(None, np.full((2, 3), 0.9 if near else 450.0)) == ()
+
+
 def test_a_range_of_forty_metres_makes_them_healthy(irb140: Any, spots: Any) -> None:
     from dataclasses import replace
 

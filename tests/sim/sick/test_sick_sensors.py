@@ -8,7 +8,7 @@ import typer
 
 import qpsafe
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
-from qpsafe.sim.experiments.fixed.loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.sick.cases import CASES
 from qpsafe.sim.sick.matrix import Result, run_matrix

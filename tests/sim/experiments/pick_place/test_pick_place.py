@@ -14,8 +14,8 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.sim.drawing.gl import gl_available
 from qpsafe.sim.experiments.pick_place.cell import PROGRAM
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment, PickRun
-from qpsafe.sim.experiments.pick_place.loop import PickLoop
 from qpsafe.sim.experiments.pick_place.people import load_people
+from qpsafe.sim.experiments.pick_place.pick_loop import PickLoop
 from qpsafe.sim.experiments.pick_place.plots import seeds_figure, timeline
 from qpsafe.sim.experiments.pick_place.report import cost, figures, promises, spread, to_dict
 from qpsafe.sim.experiments.pick_place.seeds import run_seeds

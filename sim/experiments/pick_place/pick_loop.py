@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
 from qpsafe.sensing.hulls import Obstacle
-from qpsafe.sim.experiments.fixed.loop import Moment
+from qpsafe.sim.experiments.fixed.fixed_loop import Moment
 from qpsafe.sim.experiments.pick_place.cell import Parts, Screw
 from qpsafe.sim.experiments.pick_place.gripper import Gripper
 from qpsafe.sim.experiments.pick_place.handwork import Handwork
