@@ -115,7 +115,6 @@ def test_no_room_is_crowded_and_no_module_is_long() -> None:
     assert {name: length for name, length in lengths.items() if length > 300} == {}
 
 
-<<<<<<< HEAD
 def test_no_function_takes_many_positional_arguments() -> None:
     """But compiled kernels, which cannot take them otherwise, and commands, whose options the command line names."""
     many = []
@@ -127,8 +126,8 @@ def test_no_function_takes_many_positional_arguments() -> None:
                 if len(names) > 8 and not kernel:
                     many.append(f"{path.relative_to(ROOT)}: {node.name}")
     assert many == ["qpsafe/hqp/own/hierarchy.py: run"]  # compiled in `qpsafe.hqp.own.solver`
-=======
+
+
 def test_no_two_modules_share_a_name_that_says_nothing() -> None:
     names = [path.stem for inside in rooms().values() for path in inside]
     assert [name for name in ("reference", "kernel", "timing", "loop") if names.count(name) > 1] == []
->>>>>>> names

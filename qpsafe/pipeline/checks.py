@@ -183,7 +183,7 @@ def checked_box(box: Any, limits: JointLimits, q: NDArray[np.float64], qd: NDArr
     """
     if not isinstance(box, Box):
         raise TypeError(f"the limits gave {type(box).__name__}, expected a Box")
-    box = Box(*(reals(f"the limits' {key}", value, q.shape) for key, value in box._asdict().items()))
+    box = Box._make(reals(f"the limits' {key}", value, q.shape) for key, value in box._asdict().items())
     kinds = np.array(box[2:])
     if not ((kinds >= 0) & (kinds < len(KINDS)) & (kinds == np.floor(kinds))).all():
         raise ValueError(f"the limits name limits by codes that there are not: {kinds}")
