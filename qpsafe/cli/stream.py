@@ -105,9 +105,9 @@ def stream(
         from qpsafe.irc5.axes import axes_of_robot
         from qpsafe.irc5.distances import SensorInput
         from qpsafe.irc5.event_output import EventOutput
+        from qpsafe.irc5.loop import LoopRules, StreamLoop
         from qpsafe.irc5.rules import SessionRules
         from qpsafe.irc5.run import run_stream
-        from qpsafe.irc5.stream_loop import LoopRules, StreamLoop
         from qpsafe.irc5.streamer import EgmStreamer
         from qpsafe.irc5.supervisor import Supervisor
         from qpsafe.irc5.warm_up import session_limits, warm_up

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.irc5.distances import SensorInput
+    from qpsafe.irc5.loop import StreamLoop
     from qpsafe.irc5.realtime import Grant
     from qpsafe.irc5.records.log import ReferenceWriter
     from qpsafe.irc5.run import StreamRun
-    from qpsafe.irc5.stream_loop import StreamLoop
     from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.watchdog import Watchdog
 

@@ -11,9 +11,9 @@ from qpsafe.irc5.supervisor import State
 
 if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
+    from qpsafe.irc5.loop import StreamLoop
     from qpsafe.irc5.outlet import Outlet
     from qpsafe.irc5.run import StreamRun
-    from qpsafe.irc5.stream_loop import StreamLoop
     from qpsafe.irc5.streamer import EgmStreamer
     from qpsafe.irc5.supervisor import Transition
 

@@ -37,7 +37,7 @@ STATUS = (
     INEXACT,
     FAILED,
     ILL_CONDITIONED,
-)  # own_hierarchy
+)  # hierarchy
 WORSE = 1e-8  # an answer whose level is worse than the judge's by more than this, relative above 1, is not returned
 _solve_packed: Callable[..., tuple[Array, NDArray[np.int64]]] | None = None
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 from qpsafe.irc5.distances import SensorInput
 from qpsafe.irc5.latency import Latency
+from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.realtime import resident
 from qpsafe.irc5.requests import Requests
-from qpsafe.irc5.stream_loop import ROBOT, StreamLoop
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.supervisor import State, StopCategory
 from qpsafe.irc5.watchdog import Watchdog

@@ -2,7 +2,7 @@
 
 Where a task would have to pass a singular pose to get rid of its error but cannot, its undamped velocity e/σ points
 at σ = 0 from both sides, and the robot is thrown to and fro at the joints' limits for ever. Damped below ε, see
-`hqp.own_damping`, it moves by σ K e/ε² there: it comes to rest like x' = -k x, k = c K |e|/ε², c being the curvature
+`qpsafe.hqp.own.damping`, it moves by σ K e/ε² there: it comes to rest like x' = -k x, k = c K |e|/ε², c the curvature
 |d²x/dq²| of the arm (about 1 m/rad², 1/rad). With
 
     ε² = floor² + μ Σ_(j<=k) K_j |e_j|

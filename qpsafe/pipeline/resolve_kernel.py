@@ -14,7 +14,7 @@ from numba import types
 from qpsafe import limits as limits_module
 from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.compiled.memory import view
-from qpsafe.hqp.own import regimes as own_regimes
+from qpsafe.hqp.own import regimes
 from qpsafe.hqp.own.hierarchy import HEADER
 from qpsafe.hqp.own.regimes import solve_regimes
 from qpsafe.hqp.own.solver import MODULES
@@ -121,7 +121,7 @@ _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.
         types.float64, types.float64, types.float64,
         _out, _out_ints, types.int64, types.float64[:, ::1], _out, _out_ints, _ints, _out, _out_ints, _out,
     ),
-    kinematics, clik, limits_module, laws_damping, own_regimes, *MODULES,
+    kinematics, clik, limits_module, laws_damping, regimes, *MODULES,
 )  # fmt: skip
 def resolve_tick(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,

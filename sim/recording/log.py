@@ -190,6 +190,7 @@ class Recorder:
         measured: tuple[Array, Array],
         euler: Array,
         gaps: tuple[float, float],
+        *,
         errors: tuple[Array, Array] | None = None,
         metrics: Mapping[str, Array] | None = None,
     ) -> None:

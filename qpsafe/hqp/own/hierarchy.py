@@ -5,7 +5,7 @@ Algorithm:
 1. Start at the point of the box nearest to standstill. Fixed joints leave the freedom at once.
 2. Hard rows, if any, are an inequality level of their own on top: its least violation is zero exactly if they can be
    met, and then they are constraints of everything below.
-3. Each level is minimised over the freedom left (`own_level.minimise_level`), which starts from the point reached
+3. Each level is minimised over the freedom left (`level.minimise_level`), which starts from the point reached
    before: always inside the constraints, so no search for a feasible point is needed. The level takes the directions it
    has fixed out of the freedom; its optimum can no longer change.
 4. What freedom is left goes to the smallest norm: a last level q̇ = 0.
@@ -67,7 +67,7 @@ def run(
         box_low: (n,) lower limits.
         box_high: (n,) upper limits.
         hard: whether the first level are hard rows.
-        damping: (levels,) singular values below it are damped, see `own_damping`; 0 for none.
+        damping: (levels,) singular values below it are damped, see `damping`; 0 for none.
     """
     n, rows, levels = box_low.shape[0], rows_A.shape[0], ends.shape[0]
     s = by_reference(cut(floats, integers, x, rows + 2 * n, m + n))

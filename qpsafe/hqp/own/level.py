@@ -127,8 +127,8 @@ def minimise_level(
         last: one past its last row.
         start: basis vectors already used.
         limit: turns allowed.
-        mode: what to do with singular values below `damping`, see `own_damping`.
-        damping: the ε of `own_damping`; 0 for none.
+        mode: what to do with singular values below `damping`, see `damping`.
+        damping: the ε of `damping`; 0 for none.
 
     Returns:
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.

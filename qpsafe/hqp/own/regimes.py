@@ -42,7 +42,7 @@ def solve_regimes(
         upper: (n,) upper limits.
         damping: (tasks + 1,) of each level, as in `solve_hierarchy`; the last one is 0.
         x: (tasks + 1, n) zeros; becomes q̇ of each regime.
-        info: (tasks + 1, 3 + 2 n + rows) zeros; becomes what `own_hierarchy.run` says of each.
+        info: (tasks + 1, 3 + 2 n + rows) zeros; becomes what `hierarchy.run` says of each.
         qd: (n,) zeros; becomes the blend.
     """
     n = qd0.shape[0]

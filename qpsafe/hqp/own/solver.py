@@ -9,14 +9,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.compiled import by_reference as reference
+from qpsafe.compiled import by_reference
 from qpsafe.compiled.compiled import entry, linked
-from qpsafe.hqp.own import damping as own_damping
-from qpsafe.hqp.own import hierarchy as own_hierarchy
-from qpsafe.hqp.own import level as own_level
-from qpsafe.hqp.own import linear as own_linear
-from qpsafe.hqp.own import rules as own_rules
-from qpsafe.hqp.own import state as own_state
+from qpsafe.hqp.own import damping, hierarchy, level, linear, rules, state
 from qpsafe.hqp.own.hierarchy import HEADER, run
 from qpsafe.hqp.own.state import workspace
 
@@ -37,7 +32,7 @@ _SIGNATURE = types.void(
 
 
 #: All the code that goes into the kernel.
-MODULES = (reference, own_linear, own_state, own_damping, own_rules, own_level, own_hierarchy)
+MODULES = (by_reference, linear, state, damping, rules, level, hierarchy)
 solve = entry(_SIGNATURE, *MODULES)(run)
 solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""
@@ -81,7 +76,7 @@ def solve_packed(
         damping: (levels,) singular values below it are damped; None for none.
 
     Returns:
-        q̇ (n,), and `info` of [`own_hierarchy.run`][qpsafe.hqp.own.hierarchy.run].
+        q̇ (n,), and `info` of [`hierarchy.run`][qpsafe.hqp.own.hierarchy.run].
     """
     n = box_low.shape[0]
     floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)

@@ -28,7 +28,7 @@ class State(NamedTuple):
         kind: (n + rows,) ABSENT (no constraint, or not yet), FREE, WORKING or LOCKED.
         side: (n + rows,) bound held or wanted: -1 lower, +1 upper, 2 equality, 0 none.
         x: (n,) the point, always inside the box.
-        G: (n, n + m) basis and images, see `own_linear`.
+        G: (n, n + m) basis and images, see `linear`.
         R: (n, n) triangle of the working constraints in the directions Y.
         F: (2 m, max(n, m)) factors of the level.
         working: (n,) constraints of Y in order.
@@ -38,7 +38,7 @@ class State(NamedTuple):
         u: (n + m,) solution in basis coordinates, then multipliers.
         tau: (n,) reflections of F; diagonal: (n,) of L; scratch: (n + m,).
         reach: (1,) largest joint velocity on the way so far, which all later rounding is relative to.
-        reference: (n,) solution without the nearly singular directions, see `own_damping`; flags: (2,) how many, and
+        reference: (n,) solution without the nearly singular directions, see `damping`; flags: (2,) how many, and
             one more than the last ill-conditioned level, 0 for none.
     """
 

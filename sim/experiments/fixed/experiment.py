@@ -52,8 +52,8 @@ class FixedExperiment(FixedSettings):
                 (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
                 np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
                 (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
-                own_errors(self, commanded, goals),
-                self.measured(tick, scene, plant),
+                errors=own_errors(self, commanded, goals),
+                metrics=self.measured(tick, scene, plant),
             )
             if observer is not None:
                 observer(tick, scene, plant)

@@ -91,8 +91,8 @@ class PickPlaceExperiment(PickPlaceSettings):
                 pose_error(pose, goal),
                 euler_error(commanded.pose("tcp"), goal),
                 (np.inf, gap),
-                own_errors(self, commanded, {"tcp": goal}),
-                self.measured(tick, scene, plant),
+                errors=own_errors(self, commanded, {"tcp": goal}),
+                metrics=self.measured(tick, scene, plant),
             )
             path_time.append(tick.path_time)
             wire = state.wire(qd)

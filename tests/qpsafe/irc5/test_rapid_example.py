@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from qpsafe.controller import SafetyController
+from qpsafe.irc5.loop import LoopRules
 from qpsafe.irc5.messages import DEFAULT_PORT
 from qpsafe.irc5.rules import SessionRules
-from qpsafe.irc5.stream_loop import LoopRules
 from qpsafe.sim.irc5.motion import EgmSettings
 
 FOLDER = Path(__file__).parents[3] / "examples" / "rapid"

@@ -17,12 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
+from qpsafe.irc5.loop import StreamLoop
 from qpsafe.irc5.messages import decode_sensor, encode_robot
 from qpsafe.irc5.requests import LEAVE, Requests
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.run import CHECK, StreamRun, run_stream
 from qpsafe.irc5.session import Cycle, EgmSession
-from qpsafe.irc5.stream_loop import StreamLoop
 from qpsafe.irc5.supervisor import State, Supervisor, Transition
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference

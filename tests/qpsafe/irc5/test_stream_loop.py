@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import qpsafe
+from qpsafe.irc5.loop import LoopRules, StreamLoop, gate
 from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
-from qpsafe.irc5.stream_loop import LoopRules, StreamLoop, gate
 from qpsafe.irc5.supervisor import State, StopCategory
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5
 from qpsafe.sim.irc5.in_process import ROBOT_ADDRESS, Here
