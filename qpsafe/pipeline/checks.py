@@ -159,6 +159,11 @@ def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
 def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """What a part of another making answered, as float64 of this shape; its own array if it may be.
 
+    Args:
+        whose: What a person calls it, for the error.
+        value: What came.
+        shape: That is expected.
+
     Raises:
         TypeError: Text, something complex, masked or no numbers at all.
         ValueError: Another shape.
@@ -177,6 +182,12 @@ def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float
 
 def checked_box(box: Any, limits: JointLimits, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:
     """The box (n,) that limits of another making gave at q, q̇, if it keeps to their own numbers.
+
+    Args:
+        box: What the limits gave.
+        limits: Limits of another making.
+        q: Commanded position (n,) [rad].
+        qd: Last commanded velocity (n,) [rad/s].
 
     Raises:
         TypeError, ValueError: It is none, empty, or goes beyond what the numbers allow.
