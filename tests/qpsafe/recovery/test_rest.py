@@ -63,6 +63,10 @@ def bundled_goals(rng: np.random.Generator, robot: Any, count: int) -> Iterator[
         yield np.clip(goal, robot.lower, robot.upper), np.clip(start, robot.lower, robot.upper)
 
 
+#: [rad/s] below it joints rest, as for `qpsafe.recovery.stall`: near a singular pose the last 1e-4 rad take a minute.
+AT_REST = 0.01
+
+
 def outcome(robot: Any, frame: str, goal: np.ndarray, start: np.ndarray, law: Any = None, seconds: float = 20.0) -> str:
     """ "there", "said" (at rest or not, but the tick says so), or what is wrong: "moves", "off"."""
     here = qpsafe.FixedPose(robot.pose(frame, goal))
@@ -72,7 +76,7 @@ def outcome(robot: Any, frame: str, goal: np.ndarray, start: np.ndarray, law: An
     for _ in range(round(seconds / controller.dt)):
         tick = controller.step(q, qd, points=NOTHING)
         q, qd = tick.reference.q, tick.reference.qd
-        still = still + 1 if float(np.abs(qd).max()) < 1e-3 else 0
+        still = still + 1 if float(np.abs(qd).max()) < AT_REST else 0
         off = any(np.linalg.norm(e) > NEAR[task.name] for e, task in zip(tick.errors, tasks, strict=True))
         if still > 250 and not off:
             return "there"
