@@ -68,7 +68,7 @@ AT_REST = 0.01
 
 
 def outcome(robot: Any, frame: str, goal: np.ndarray, start: np.ndarray, law: Any = None, seconds: float = 20.0) -> str:
-    """ "there", "said" (at rest or not, but the tick says so), "nearing" (slowly, but by a twentieth in two seconds), or
+    """ "there", "said" (at rest or not, but the tick says so), "nearing" (by a twentieth in two seconds, if slowly), or
     what is wrong: "moves", "off"."""
     here = qpsafe.FixedPose(robot.pose(frame, goal))
     tasks = [qpsafe.PositionTask(frame, here), qpsafe.OrientationTask(frame, here)]
