@@ -163,7 +163,7 @@ class SafetyController(Parts):
             distances: Reading of every spot (k,) [m]; beyond its range, +inf included, it sees nothing; NaN, -inf and
                 what is below zero are sick. An array (p, 3) is taken as `points`.
             points: Detected points (p, 3) instead, world frame [m]; each belongs to the wire link nearest to it.
-            ages: How old the distances are, (k,) or one number [s]; fresh by default.
+            ages: How old the distances are, (k,) or one number [s]; fresh by default. Points have none.
 
         Returns:
             The tick, with the joint reference to send.

@@ -98,12 +98,12 @@ class Sense:
         if not q.shape == qd.shape == self._shape:
             refuse(q, qd, self._robot)
         if points is not None:
-            return self._by_points(q, qd, points)
+            return self._by_points(q, qd, points, ages)
         if distances is None:
             raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
         distances = as_floats("distances", distances)
         if distances.ndim == 2 and distances.shape[1] == 3:
-            return self._by_points(q, qd, distances)
+            return self._by_points(q, qd, distances, ages)
         return self._by_distances(q, qd, distances, ages)
 
     def _by_distances(self, q: Array, qd: Array, distances: Array, ages: ArrayLike | None) -> Seen:
@@ -129,7 +129,9 @@ class Sense:
         )
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
 
-    def _by_points(self, q: Array, qd: Array, value: ArrayLike) -> Seen:
+    def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None) -> Seen:
+        if ages is not None:  # old points would count as seen now
+            raise BadInput("ages are given with points, which have none: leave out points that are too old")
         given = as_points(value)
         p = len(given)
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))

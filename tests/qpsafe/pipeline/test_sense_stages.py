@@ -126,7 +126,7 @@ def test_points(irb140: Any, ours: bool, seed: int, what: str) -> None:
         assert np.array_equal(np.asarray(points, dtype=float), plain)
 
 
-@pytest.mark.parametrize("what", ["q", "qd", "short", "absurd", "shape", "ages", "points", "both", "neither"])
+@pytest.mark.parametrize("what", ["q", "qd", "short", "absurd", "shape", "ages", "points", "both", "neither", "old"])
 def test_what_cannot_be_used_touches_nothing(irb140: Any, what: str) -> None:
     spots = qpsafe.load_spots(irb140)
     sensing, evasion = DistanceSensing(irb140, spots, 0.004), Evasion(4.0, 20.0, 6)
@@ -137,10 +137,10 @@ def test_what_cannot_be_used_touches_nothing(irb140: Any, what: str) -> None:
     q[0] = 90.0 if what == "absurd" else q[0]
     before = copy.deepcopy(sensing.memory)
     given_q = q[:5] if what == "shape" else q
-    readings: Any = distances[1:] if what == "short" else None if what in ("points", "neither") else distances
-    points = np.ones((2, 2)) if what == "points" else np.ones((2, 3)) if what == "both" else None
+    readings: Any = distances[1:] if what == "short" else None if what in ("points", "neither", "old") else distances
+    points = np.ones((2, 2)) if what == "points" else np.ones((2, 3)) if what in ("both", "old") else None
     with pytest.raises(BadInput):
-        sense(given_q, qd, readings, points, np.zeros(3) if what == "ages" else None)
+        sense(given_q, qd, readings, points, np.zeros(3) if what == "ages" else 5.0 if what == "old" else None)
     assert not evasion.velocity.any()
     for now, then in zip(sensing.memory, before, strict=True):
         np.testing.assert_array_equal(now, then)
