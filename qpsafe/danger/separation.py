@@ -1,0 +1,71 @@
+"""Speed and separation monitoring: how far away a person has to be, and how fast a robot may approach one.
+
+With v_r the robot's speed towards the person, v_h the person's, T_r the reaction time, a_s the deceleration of a stop,
+C the intrusion distance, Z_d and Z_r the uncertainty of the person's and the robot's place,
+
+    S_p(v_r) = v_h (T_r + v_r/a_s) + v_r T_r + v_r²/(2 a_s) + C + Z_d + Z_r
+
+is the protective separation distance of ISO/TS 15066 (5.5.4) for constant deceleration, and its exact inverse
+
+    v_max(d) = sqrt(b² + 2 a_s (d - C - Z_d - Z_r - v_h T_r)) - b,   b = a_s T_r + v_h
+
+the largest speed towards a person at distance d; 0 where d is below S_p(0).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.errors import ConfigurationError
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Figures of speed and separation monitoring.
+
+    Attributes:
+        deceleration: a_s, of a stop, the smallest that was measured [m/s²].
+        person_speed: v_h, 1.6 for walking people, 2.0 for reaching hands (ISO 13855) [m/s].
+        reaction_time: T_r, from what the sensor sees to the beginning of the stop [s].
+        intrusion: C, how far a part of the body may be past what is detected [m]. ISO 13855 asks for 0.85 m where the
+            sensor does not tell hands; the default 0 does not conform, as no sensor that sees 0.8 m far could.
+        person_error, robot_error: Z_d, Z_r, errors of both places [m].
+
+    Raises:
+        ConfigurationError: A value is not finite or negative, or the deceleration is 0.
+    """
+
+    deceleration: float
+    person_speed: float = 1.6
+    reaction_time: float = 0.02
+    intrusion: float = 0.0
+    person_error: float = 0.02
+    robot_error: float = 0.005
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not (isinstance(value, int | float) and 0.0 <= value < math.inf):
+                raise ConfigurationError("Separation", item.name, value, "a finite number >= 0")
+        if not self.deceleration > 0.0:
+            raise ConfigurationError("Separation", "deceleration", self.deceleration, "a finite number > 0 [m/s²]")
+
+    @property
+    def standing(self) -> float:
+        """S_p(0), the distance that even a robot at rest asks for [m]."""
+        return self.person_speed * self.reaction_time + self.intrusion + self.person_error + self.robot_error
+
+    def distance(self, speed: ArrayLike) -> NDArray[np.float64]:
+        """S_p for speeds of the robot towards the person, any shape [m/s]; speeds below 0 count as 0 [m]."""
+        v, a_s, T_r = np.maximum(np.asarray(speed, dtype=float), 0.0), self.deceleration, self.reaction_time
+        return self.standing + self.person_speed * v / a_s + v * T_r + v * v / (2.0 * a_s)
+
+    def speed(self, distance: ArrayLike) -> NDArray[np.float64]:
+        """v_max for distances, any shape [m]; +inf where the distance is, 0 where it is not a number [m/s]."""
+        b = self.deceleration * self.reaction_time + self.person_speed
+        room = np.nan_to_num(np.asarray(distance, dtype=float) - self.standing, nan=-1.0, posinf=np.inf)
+        return np.where(room > 0.0, np.sqrt(b * b + 2.0 * self.deceleration * np.maximum(room, 0.0)) - b, 0.0)

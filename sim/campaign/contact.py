@@ -1,0 +1,137 @@
+"""Contacts of a run: when, where, what the robot did at the contact point one tick before, and how hard.
+
+A contact begins at the first tick at which robot and person overlap; what is said of it is taken one tick before, where
+the two surfaces still have a nearest pair of points and a direction between them. People do not give way: a run goes on
+through a contact as if nothing had happened, and only the first one is described.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.sim.campaign.harm import blow, effective_mass
+from qpsafe.sim.world.rays import cast
+from qpsafe.sim.world.scene import ROBOT_COLLISION, SCENERY
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.recording import Recording
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.engine.tracks import PersonTracks
+
+Array = NDArray[np.float64]
+
+MOVING, TOWARDS = 1e-3, 0.1  # speeds of the robot's contact point from which it moves, and moves towards somebody [m/s]
+NEAR = 0.3  # a part counts as seen if it is this near to a point that is [m]
+ROOM = 0.05  # a part with less room than this behind it is clamped [m]
+
+
+class Touch(NamedTuple):
+    """Nearest points of robot and people at one tick.
+
+    Attributes:
+        k: The tick.
+        distance: [m].
+        on_robot, on_person: (3,) [m].
+        body: Of the robot, as in its tree.
+        segment: Column of the tracks; a board's number minus the number of boards if it is one.
+    """
+
+    k: int
+    distance: float
+    on_robot: Array
+    on_person: Array
+    body: int
+    segment: int
+
+
+def described(run: Recording, station: Station, tracks: PersonTracks, before: Touch, seen: Array) -> dict[str, Any]:
+    """What the row says of a contact.
+
+    Args:
+        run: Of a controller.
+        station: Where it was.
+        tracks: Everybody's capsules.
+        before: Nearest points one tick before the contact.
+        seen: Points that counted then (p, 3) [m].
+    """
+    robot, k = station.robot, before.k
+    state = robot.at(run.q[k])
+    away = before.on_person - before.on_robot
+    normal = away / max(float(np.linalg.norm(away)), 1e-12)
+    J = point_jacobian(state, before.body, before.on_robot)
+    velocity = J @ run.qd[k]
+    towards = float(velocity @ normal)
+    closing = towards - float(tracks.velocity(k, before.segment, before.on_person) @ normal)
+    clamped = _clamped(station, run.q[k], tracks, before, normal)
+    region = tracks.names[before.segment] if before.segment >= 0 else "board"
+    mass = effective_mass(robot, run.q[k], J, normal)
+    hit = blow(region, closing, mass, clamped and towards > MOVING)
+    speed = float(np.linalg.norm(velocity))
+    near = bool(len(seen)) and float(np.linalg.norm(seen - before.on_person, axis=1).min()) <= NEAR
+    return {
+        "contact": True,
+        "contact_time": (k + 1) * run.dt,
+        "contact_class": classified(speed, towards, clamped),
+        "contact_region": region,
+        "contact_frame": station.world.body_names[before.body],
+        "moving": speed > MOVING,
+        "towards": towards > TOWARDS,
+        "clamped": clamped and speed > MOVING,
+        "towards_speed": towards,
+        "robot_speed": speed,
+        "closing_speed": closing,
+        "near_seen": near,
+        "energy": hit.energy,
+        "energy_limit": hit.energy_limit,
+        "energy_share": hit.energy / hit.energy_limit,
+        "force": hit.force,
+        "force_limit": hit.force_limit,
+    }
+
+
+def classified(speed: float, towards: float, clamped: bool) -> str:
+    """``rest``, ``away``, ``sideways``, ``towards`` or ``clamped``, by what the robot does at the contact point.
+
+    Args:
+        speed: Of the point [m/s].
+        towards: Its part towards the person [m/s].
+        clamped: Whether the part has nowhere to go.
+    """
+    if not speed > MOVING:
+        return "rest"
+    if clamped and towards > MOVING:
+        return "clamped"
+    if towards > TOWARDS:
+        return "towards"
+    return "away" if towards < -TOWARDS else "sideways"
+
+
+def point_jacobian(state: Any, body: int, point: Array) -> Array:
+    """Linear Jacobian (3, n) of the point of a body that is at `point` now (3,).
+
+    Args:
+        state: Of the robot.
+        body: As in its tree, 0 for the base.
+        point: (3,) [m].
+    """
+    n = state.robot.nq
+    twists = state.memory[16 * (n + 1) : 16 * (n + 1) + 6 * n].reshape(6, n)
+    linear = twists[:3] + np.cross(twists[3:], point, axis=0)  # v + ω × p
+    return np.asarray(state.robot.tree.supports[body] * linear)
+
+
+def _clamped(station: Station, q: Array, tracks: PersonTracks, before: Touch, normal: Array) -> bool:
+    """Whether scenery, or the robot itself, is right behind the touched part."""
+    if before.segment >= 0:
+        thickness = 2.0 * float(tracks.radii[before.segment])
+    else:
+        thickness = 2.0 * float(tracks.half_sizes[before.segment].min())
+    data = station.scene.make_data(q)
+    reach = thickness + ROOM
+    start = before.on_person + 1e-6 * normal
+    hit = cast(station.scene, data, start[None], normal[None], reach, groups=(SCENERY, ROBOT_COLLISION))
+    return bool(math.isfinite(hit[0]))
