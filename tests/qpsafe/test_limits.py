@@ -138,6 +138,18 @@ def test_wrong_limits_are_refused_by_name(change: dict, key: str) -> None:
     assert caught.value.key == key
 
 
+def test_a_jerk_limit_never_hides_what_else_gave_way() -> None:
+    """Of all limits that cannot be met the most important one is named: jerk only where nothing else gave way."""
+    rng, n = np.random.default_rng(8), 2000
+    base = random_limits(rng, n)
+    v, a = base.max_velocity, base.max_acceleration
+    limits = JointLimits(base.lower, base.upper, v, a, DT, max_jerk=rng.uniform(1.0, 100.0, n) * a)
+    q, qd, qdd = rng.uniform(base.lower - 0.1, base.upper + 0.1), rng.uniform(-2.0, 2.0, n) * v, rng.normal(size=n) * a
+    plain, smooth = base.box(q, qd).sacrificed, limits.box(q, qd, qdd).sacrificed
+    assert (smooth[plain > 0] == plain[plain > 0]).all()
+    assert set(smooth[plain == 0]) == {0, 4}
+
+
 def test_controller_gives_the_jerk_limit_the_last_acceleration() -> None:
     """A point appears before the tool: the commanded acceleration rises by at most jerk dt from tick to tick."""
     import qpsafe

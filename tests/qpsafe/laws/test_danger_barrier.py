@@ -42,6 +42,14 @@ def test_kinetic_gradient_obeys_eulers_theorem(seed: int) -> None:
     assert DangerBarrier(10.0).kinetic_gradient(state, qd, points) @ qd == pytest.approx(H, rel=1e-12)
 
 
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.floats(0.0, 0.99e-3))
+def test_at_rest_no_direction_of_motion_counts(seed: int, speed: float) -> None:
+    """H has a kink at rest: a direction that rounding has chosen must not decide where the robot goes."""
+    state, qd, points = scene(seed)
+    assert not DangerBarrier(10.0).kinetic_gradient(state, speed * qd / np.abs(qd).max(), points).any()
+
+
 @settings(max_examples=40, deadline=None)
 @given(seeds, st.floats(3.0, 30.0), st.floats(0.1, 5.0))
 def test_scaling_caps_the_field_exactly(seed: int, delta_max: float, speed: float) -> None:
