@@ -1,0 +1,175 @@
+"""Where a ray meets the surface of a shape first, compiled; +inf where it does not.
+
+A ray o + t d with |d| = 1 and t >= 0, in the shape's frame. From inside, the surface is met from inside. Only a plane
+has one side: it is met from above, within its sizes where it has some.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, inline
+from qpsafe.sim.engine.layout import CAPSULE, CYLINDER, ELLIPSOID, PLANE, SPHERE
+from qpsafe.sim.engine.world import Index
+
+TINY = 1e-15  # of what is no direction
+EDGE = 1e-12  # by which triangles overlap, so that no ray slips between two
+BAND = 1e-5  # width in which a mesh's planes may stand off its triangles [m]
+
+
+@inline
+def _first(near: float, far: float) -> float:
+    """The first of two crossings that lies ahead."""
+    return near if near >= 0.0 else far if far >= 0.0 else inf
+
+
+@inline
+def ray_plane(o: Vector, d: Vector, a: float, b: float) -> float:
+    """The plane z = 0 from above, within |x| <= a and |y| <= b where these are > 0."""
+    if d[2] > -TINY or o[2] < 0.0:
+        return inf
+    t = -o[2] / d[2]
+    x, y = o[0] + t * d[0], o[1] + t * d[1]
+    return t if (a <= 0.0 or abs(x) <= a) and (b <= 0.0 or abs(y) <= b) else inf
+
+
+@inline
+def ray_ellipsoid(o: Vector, d: Vector, a: float, b: float, c: float) -> float:
+    """The ellipsoid of semi-axes a, b, c around the origin."""
+    o, d = (o[0] / a, o[1] / b, o[2] / c), (d[0] / a, d[1] / b, d[2] / c)
+    A, B, C = dot(d, d), dot(o, d), dot(o, o) - 1.0
+    h = B * B - A * C
+    if h < 0.0:
+        return inf
+    h = sqrt(h)
+    return _first((-B - h) / A, (-B + h) / A)
+
+
+@inline
+def ray_capsule(o: Vector, d: Vector, start: Vector, axis: Vector, r: float) -> float:
+    """The capsule of radius r around the segment from `start` to `start + axis`."""
+    o = add(o, -1.0, start)
+    length = sqrt(dot(axis, axis))
+    s = 1.0 / length if length > 0.0 else 0.0
+    u = (s * axis[0], s * axis[1], s * axis[2])
+    # the infinite cylinder |p⊥ + t d⊥| = r around the axis
+    z, w = dot(o, u), dot(d, u)
+    p, q = add(o, -z, u), add(d, -w, u)
+    A, B, C = dot(q, q), dot(p, q), dot(p, p) - r * r
+    best = inf
+    h = B * B - A * C
+    if h < 0.0:
+        return inf  # then both balls are missed too
+    if A > TINY * TINY:
+        h = sqrt(h)
+        for t in ((-B - h) / A, (-B + h) / A):
+            if 0.0 <= t < best and 0.0 <= z + t * w <= length:
+                best = t
+    for k in range(2):
+        # the outer half of the ball around an end
+        m = o if k == 0 else add(o, -1.0, axis)
+        B, C = dot(m, d), dot(m, m) - r * r
+        h = B * B - C
+        if h >= 0.0:
+            h = sqrt(h)
+            for t in (-B - h, -B + h):
+                side = z + t * w
+                if 0.0 <= t < best and (side <= 0.0 if k == 0 else side >= length):
+                    best = t
+    return best
+
+
+@inline
+def ray_cylinder(o: Vector, d: Vector, r: float, half: float) -> float:
+    """The cylinder of radius r and height 2 half around the z axis."""
+    near, far = -inf, inf
+    A, B, C = d[0] * d[0] + d[1] * d[1], o[0] * d[0] + o[1] * d[1], o[0] * o[0] + o[1] * o[1] - r * r
+    if A > TINY * TINY:
+        h = B * B - A * C
+        if h < 0.0:
+            return inf
+        h = sqrt(h)
+        near, far = (-B - h) / A, (-B + h) / A
+    elif C > 0.0:
+        return inf
+    if abs(d[2]) > TINY:
+        low, high = (-half - o[2]) / d[2], (half - o[2]) / d[2]
+        near, far = max(near, min(low, high)), min(far, max(low, high))
+    elif abs(o[2]) > half:
+        return inf
+    return _first(near, far) if near <= far else inf
+
+
+@inline
+def ray_box(o: Vector, d: Vector, a: float, b: float, c: float) -> float:
+    """The box of half sizes a, b, c around the origin."""
+    near, far = -inf, inf
+    for x, v, half in ((o[0], d[0], a), (o[1], d[1], b), (o[2], d[2], c)):
+        if abs(v) > TINY:
+            low, high = (-half - x) / v, (half - x) / v
+            near, far = max(near, min(low, high)), min(far, max(low, high))
+        elif abs(x) > half:
+            return inf
+    return _first(near, far) if near <= far else inf
+
+
+@inline
+def _ray_triangles(o: Vector, d: Vector, triangles: Array, first: int, last: int) -> float:
+    """The nearest of some triangles, from either side."""
+    best = inf
+    for i in range(first, last):
+        e, f = (triangles[i, 3], triangles[i, 4], triangles[i, 5]), (triangles[i, 6], triangles[i, 7], triangles[i, 8])
+        p = cross(d, f)
+        area = dot(e, p)
+        if area == 0.0:
+            continue
+        s = (o[0] - triangles[i, 0], o[1] - triangles[i, 1], o[2] - triangles[i, 2])
+        q = cross(s, e)
+        u, v, t = dot(s, p) / area, dot(d, q) / area, dot(f, q) / area
+        if u >= -EDGE and v >= -EDGE and u + v <= 1.0 + EDGE and 0.0 <= t < best:
+            best = t
+    return best
+
+
+@inline
+def ray_mesh(o: Vector, d: Vector, limit: float, row: Index, planes: Array, faces: Index, triangles: Array) -> float:
+    """A mesh: that of its triangles which the ray meets first, found by its planes where it is convex."""
+    near, far, front, back = -inf, inf, -1, -1
+    for k in range(row[6], row[6] + row[7]):
+        gap = planes[k, 0] * o[0] + planes[k, 1] * o[1] + planes[k, 2] * o[2] + planes[k, 3]
+        slope = planes[k, 0] * d[0] + planes[k, 1] * d[1] + planes[k, 2] * d[2]
+        if slope < 0.0:
+            if gap > -near * slope:
+                near, front = -gap / slope, k
+        elif slope > 0.0:
+            if gap > -far * slope:
+                far, back = -gap / slope, k
+        elif gap > 0.0:
+            return inf
+        if near > far:
+            return inf
+    if far < 0.0 or near > limit:
+        return inf
+    t = inf
+    if front >= 0 and near >= -BAND:
+        t = _ray_triangles(o, d, triangles, faces[front], faces[front + 1])
+    if t == inf and back >= 0 and near < BAND:
+        t = _ray_triangles(o, d, triangles, faces[back], faces[back + 1])
+    # not convex, or in the narrow band where planes stand off the triangles
+    return t if t < inf else _ray_triangles(o, d, triangles, row[8], row[8] + row[9])
+
+
+@inline
+def ray_primitive(kind: int, o: Vector, d: Vector, a: float, b: float, c: float) -> float:
+    """A shape of the given kind, but no mesh, with MuJoCo's three sizes."""
+    if kind == PLANE:
+        return ray_plane(o, d, a, b)
+    if kind == SPHERE:
+        return ray_ellipsoid(o, d, a, a, a)
+    if kind == CAPSULE:
+        return ray_capsule(o, d, (0.0, 0.0, -b), (0.0, 0.0, 2.0 * b), a)
+    if kind == ELLIPSOID:
+        return ray_ellipsoid(o, d, a, b, c)
+    if kind == CYLINDER:
+        return ray_cylinder(o, d, a, b)
+    return ray_box(o, d, a, b, c)

@@ -1,0 +1,222 @@
+"""All shapes of a scene but people and boards, in flat arrays for compiled code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.engine import layout
+from qpsafe.sim.engine.hull_mesh import HullMesh, hull_mesh
+from qpsafe.sim.world.robot_spec import ROBOT_COLLISION
+from qpsafe.sim.world.surroundings import SCENERY
+
+if TYPE_CHECKING:
+    from qpsafe.sim.world.scene import Scene
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+KINDS = {
+    layout.PLANE: "plane",
+    layout.SPHERE: "sphere",
+    layout.CAPSULE: "capsule",
+    layout.ELLIPSOID: "ellipsoid",
+    layout.CYLINDER: "cylinder",
+    layout.BOX: "box",
+    layout.MESH: "mesh",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Floor, scenery and the robot's collision geoms. Its arrays are read-only; their columns stand in `layout`.
+
+    Shapes are fixed in bodies: 0 is the world, i the body i of `robot.tree`, whose poses come first in
+    `RobotState.memory`, and then the bodies of `movable`.
+
+    Attributes:
+        names: Of the shapes, as in the scene, (g,).
+        geoms: Their numbers in the scene, (g,).
+        index: What they are, and where they have their vertices, planes and triangles, (g, 10).
+        shapes: Their poses, sizes and bounds, (g, 26).
+        vertices: Of the hulls of all meshes, (v, 3) [m].
+        starts: First neighbour of each vertex, (v + 1,).
+        neighbours: Vertices at the other ends of a vertex's edges.
+        planes: Around the meshes that are convex, (p, 4).
+        faces: First triangle on each plane, (p + 1,).
+        triangles: A corner and the two edges from it, (t, 9) [m].
+        robot: Which shapes are the robot's, (r,).
+        furniture: Which are tables, supports, boxes: all fixed boxes of the scenery but the pedestal's.
+        floors: Which are planes.
+        movable: The scene's bodies that carry scenery and are neither fixed nor the robot's.
+        bodies: How many bodies there are, the world among them.
+    """
+
+    names: tuple[str, ...]
+    geoms: Index
+    index: Index
+    shapes: Array
+    vertices: Array
+    starts: Index
+    neighbours: Index
+    planes: Array
+    faces: Index
+    triangles: Array
+    robot: Index
+    furniture: Index
+    floors: Index
+    movable: Index
+    bodies: int
+
+    @property
+    def seen(self) -> tuple[Index, Array, Array, Index, Array]:
+        """What rays are cast against: index, shapes, planes, faces, triangles."""
+        return self.index, self.shapes, self.planes, self.faces, self.triangles
+
+    @property
+    def solid(self) -> tuple[Index, Array, Array, Index, Index]:
+        """What distances are measured to: index, shapes, vertices, starts, neighbours."""
+        return self.index, self.shapes, self.vertices, self.starts, self.neighbours
+
+    @classmethod
+    def of(cls, scene: Scene, *, movable: bool = False) -> World:
+        """The world of a scene.
+
+        Args:
+            scene: From `build_scene`.
+            movable: Whether scenery that can move, like the screws of the pick-and-place cell, is part of it. Then
+                poses of the bodies `movable` must follow those of the robot's; by default it is left out.
+
+        Raises:
+            ConfigurationError: A geom is of a kind that has no place here: a height field or a signed distance field.
+        """
+        model, data = scene.model, scene.make_data()
+        owners, loose = _owners(scene)
+        poses = [*scene.robot.at(scene.robot.home).body_poses(), *(_pose(data.xpos[b], data.xmat[b]) for b in loose)]
+        geoms = [
+            g
+            for g in np.flatnonzero((model.geom_group == SCENERY) | (model.geom_group == ROBOT_COLLISION))
+            if movable or owners[model.geom_bodyid[g]] <= scene.robot.nq
+        ]
+        meshes: list[HullMesh] = []
+        index, shapes = np.zeros((len(geoms), layout.INTEGERS), dtype=np.int64), np.zeros((len(geoms), layout.FLOATS))
+        counts = np.zeros(3, dtype=np.int64)
+        for row, numbers, g in zip(index, shapes, geoms, strict=True):
+            body, kind, name = model.geom_bodyid[g], int(model.geom_type[g]), model.geom(g).name
+            if kind not in KINDS:
+                raise ConfigurationError("World", f"geom {name}", model.geom_type[g], f"one of {', '.join(KINDS.values())}")
+            row[:4] = kind, owners[body], body, _is_seen(model, g)
+            place = np.linalg.inv(poses[owners[body]]) @ _pose(data.geom_xpos[g], data.geom_xmat[g])
+            points = None
+            if kind == layout.MESH:
+                meshes.append(_mesh(model, g))
+                points = meshes[-1].vertices
+                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].triangles)]
+                row[layout.VERTEX :] = np.stack((counts, sizes), axis=1).ravel()
+                counts += sizes
+            _measure(numbers, kind, place, model.geom_size[g], points)
+        fixed_box = (index[:, layout.BODY] == 0) & (index[:, layout.KIND] == layout.BOX)
+        scenery = model.geom_group[geoms] == SCENERY
+        pedestal = np.array([model.geom(g).name.startswith("pedestal") for g in geoms], dtype=bool)
+        first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+        edges = np.cumsum([0, *(len(mesh.neighbours) for mesh in meshes)])
+        pieces = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
+        return cls(
+            names=tuple(model.geom(g).name for g in geoms),
+            geoms=_frozen(geoms, np.int64),
+            index=_frozen(index, np.int64),
+            shapes=_frozen(shapes),
+            vertices=_frozen(np.vstack([np.zeros((0, 3)), *(mesh.vertices for mesh in meshes)])),
+            starts=_frozen(
+                np.concatenate([*(m.starts[:-1] + at for m, at in zip(meshes, edges, strict=False)), edges[-1:]]), np.int64
+            ),
+            neighbours=_frozen(
+                np.concatenate([[], *(m.neighbours + at for m, at in zip(meshes, first, strict=False))]), np.int64
+            ),
+            planes=_frozen(np.vstack([np.zeros((0, 4)), *(mesh.planes for mesh in meshes)])),
+            faces=_frozen(
+                np.concatenate([*(m.faces + at for m, at in zip(meshes, pieces, strict=False)), pieces[-1:]]), np.int64
+            ),
+            triangles=_frozen(np.vstack([np.zeros((0, 9)), *(mesh.triangles for mesh in meshes)])),
+            robot=_frozen(np.flatnonzero(~scenery), np.int64),
+            furniture=_frozen(np.flatnonzero(scenery & fixed_box & ~pedestal), np.int64),
+            floors=_frozen(np.flatnonzero(index[:, layout.KIND] == layout.PLANE), np.int64),
+            movable=_frozen(loose if movable else [], np.int64),
+            bodies=scene.robot.nq + 1 + (len(loose) if movable else 0),
+        )
+
+
+def _owners(scene: Scene) -> tuple[list[int], list[int]]:
+    """Body of the world that each body of the scene belongs to, and the scene's bodies that are not the robot's.
+
+    Joints that are held do not move their bodies.
+    """
+    model, robot = scene.model, scene.robot
+    number = {f"robot/{name}": i + 1 for i, name in enumerate(robot.joint_names)}
+    held = {f"robot/{name}" for name in robot.held}
+    owners, loose = [0], []
+    for body in range(1, model.nbody):
+        first = model.body_jntadr[body]
+        names = [model.joint(j).name for j in range(first, first + model.body_jntnum[body])]
+        moving = [name for name in names if name not in held]
+        if not moving:
+            owners.append(owners[model.body_parentid[body]])
+        elif moving[-1] in number:
+            owners.append(number[moving[-1]])
+        else:
+            owners.append(robot.nq + 1 + len(loose))
+            loose.append(body)
+    return owners, loose
+
+
+def _pose(position: Array, matrix: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = matrix.reshape(3, 3), position
+    return pose
+
+
+def _is_seen(model: Any, geom: int) -> bool:
+    """Whether MuJoCo's rays meet a geom: not what is fully transparent."""
+    material = int(model.geom_matid[geom])
+    alpha = model.geom_rgba[geom, 3] if material < 0 else model.mat_rgba[material, 3]
+    return bool(alpha > 0.0)
+
+
+def _mesh(model: Any, geom: int) -> HullMesh:
+    mesh = int(model.geom_dataid[geom])
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    begin, number = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    vertices = model.mesh_vert[first : first + count].astype(np.float64)
+    return hull_mesh(vertices, model.mesh_face[begin : begin + number].astype(np.int64))
+
+
+def _measure(row: Array, kind: int, place: Array, size: Array, points: Array | None) -> None:
+    """Fill a row of `World.shapes`."""
+    a, b, c = size
+    half = {
+        layout.PLANE: (np.inf, np.inf, 0.0),
+        layout.SPHERE: (a, a, a),
+        layout.CAPSULE: (a, a, a + b),
+        layout.CYLINDER: (a, a, b),
+    }.get(kind, (a, b, c))
+    centre, radius = np.zeros(3), {layout.CYLINDER: np.hypot(a, b), layout.BOX: np.linalg.norm(size)}.get(kind, max(half))
+    if points is not None:
+        low, high = points.min(axis=0), points.max(axis=0)
+        centre, half = 0.5 * (low + high), tuple(0.5 * (high - low))
+        radius = np.sqrt(((points - centre) ** 2).sum(axis=1)).max()
+    row[layout.POSE : layout.SIZE] = place[:3].ravel()
+    row[layout.SIZE : layout.MARGIN] = size
+    row[layout.MARGIN] = a if kind in (layout.SPHERE, layout.CAPSULE) else 0.0
+    row[layout.CASE : layout.BALL] = *centre, *half
+    row[layout.BALL :] = *(place[:3, :3] @ centre + place[:3, 3]), radius
+
+
+def _frozen(values: Any, kind: Any = np.float64) -> NDArray[Any]:
+    array = np.array(values, dtype=kind, order="C")
+    array.flags.writeable = False
+    return array
