@@ -1,0 +1,1 @@
+"""Encounters of a robot with people, computed fast."""
