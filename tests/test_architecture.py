@@ -27,6 +27,7 @@ tick
 controller
 plugins placement irc5 irc5.records bench
 sim.people sim.world
+sim.engine
 sim.stories sim.recording
 sim.drawing
 sim.experiments.shared

@@ -18,11 +18,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.people.footsteps import Footsteps
 from qpsafe.sim.people.glide import Track
-from qpsafe.sim.people.person import Board, Person, PersonPose
+from qpsafe.sim.people.person import Board, Person, PersonPose, PersonPoses
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,11 @@ class Choreography:
         """Who is there, for `build_scene(robot, people=...)`."""
         return (self.person,)
 
+    @property
+    def people(self) -> tuple[Choreography, ...]:
+        """Who moves, like a story's."""
+        return (self,)
+
     def poses(self, time: float) -> tuple[PersonPose, ...]:
         """Everybody at a time [s], for `scene.place_people`."""
         return (self.pose(time),)
@@ -205,25 +213,24 @@ class Choreography:
         """When the last withdrawal is complete [s]."""
         return self.windows[-1][1]
 
-    def root(self, time: float) -> tuple[float, float, float]:
-        """The person's root at a time [s]: x [m], y [m], heading [rad]."""
+    def root(self, times: Array | float) -> tuple[Array, Array, Array]:
+        """The person's root at times [s]: x [m], y [m], heading [rad], each in the shape of the times."""
         radius, azimuth, turn, _ = self._plan
-        r, phi = radius(time), azimuth(time)
-        return r * math.cos(phi), r * math.sin(phi), phi + math.pi + turn(time)
+        r, phi = radius(times), azimuth(times)
+        return r * np.cos(phi), r * np.sin(phi), phi + math.pi + turn(times)
 
     def board_distance(self, time: float) -> float:
         """Horizontal distance from the robot's base axis to the nearest point of the board's face at a time [m]."""
         x, y, heading = self.root(time)
         board = self.board
         ahead = x * math.cos(heading) + y * math.sin(heading) + board.reach  # the axis, seen from the board's face
-        aside = max(abs(-x * math.sin(heading) + y * math.cos(heading)) - board.width / 2, 0.0)
+        aside = max(abs(float(y * math.cos(heading) - x * math.sin(heading))) - board.width / 2, 0.0)
         return math.hypot(ahead, aside)
 
     @cached_property
     def peak_speed(self) -> float:
         """Largest speed of the root and of the board's centre, sampled every 10 ms [m/s]."""
-        times = np.arange(0.0, self.duration + 0.005, 0.01)
-        x, y, heading = np.array([self.root(t) for t in times]).T
+        x, y, heading = self.root(np.arange(0.0, self.duration + 0.005, 0.01))
         board = x + self.board.reach * np.cos(heading), y + self.board.reach * np.sin(heading)
         speeds = [np.hypot(np.diff(px), np.diff(py)) / 0.01 for px, py in ((x, y), board)]
         return float(np.max(speeds))
@@ -232,9 +239,13 @@ class Choreography:
     def _footsteps(self) -> Footsteps:
         return Footsteps(self.person, self.root, self.duration)
 
+    def poses_at(self, times: Array) -> PersonPoses:
+        """The person and the board at times (T,) [s]."""
+        return self.person.poses(np.stack(self.root(times), axis=-1), self._footsteps.at(times))
+
     def pose(self, time: float) -> PersonPose:
         """The person and the board at a time [s]."""
-        return self.person.pose(*self.root(time), feet=self._footsteps(time))
+        return self.poses_at(np.array([time]))[0]
 
     def varied(self, seed: int) -> Choreography:
         """The same choreography as another day would see it: a few centimetres, tenths of a second, degrees off.

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-import bisect
 import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 class Track:
@@ -31,20 +35,17 @@ class Track:
         self.value = to
         return start + duration
 
-    def __call__(self, time: float) -> float:
-        """The value at a time [s]."""
-        index = bisect.bisect_right(self._starts, time) - 1
-        if index < 0:
-            return self._first
-        duration, ramp, a, b = self._glides[index]
-        t = time - self._starts[index]
-        if t >= duration:
-            return b
+    def __call__(self, times: Array | float) -> Array:
+        """The values at times [s], in their shape."""
+        times = np.asarray(times, dtype=float)
+        if not self._glides:
+            return np.full(times.shape, self._first)
+        which = np.searchsorted(self._starts, times, side="right") - 1
+        duration, ramp, a, b = np.moveaxis(np.array(self._glides)[which], -1, 0)
+        t = np.clip(times - np.array(self._starts)[which], 0.0, duration)
         # speed / full speed: (1 - cos(pi t / ramp)) / 2 on the ramps, 1 between; integrated, symmetric in time
-        s = min(t, duration - t)
-        if s < ramp:
-            covered = 0.5 * (s - ramp / math.pi * math.sin(math.pi * s / ramp))
-        else:
-            covered = s - 0.5 * ramp
-        share = covered / (duration - ramp)
-        return a + (b - a) * (share if t <= duration - t else 1.0 - share)
+        s = np.minimum(t, duration - t)
+        speeding = 0.5 * (s - ramp / math.pi * np.sin(math.pi * s / ramp))
+        share = np.where(s < ramp, speeding, s - 0.5 * ramp) / (duration - ramp)
+        value = a + (b - a) * np.where(t <= duration - t, share, 1.0 - share)
+        return np.where(which < 0, self._first, np.where(t >= duration, b, value))

@@ -11,7 +11,6 @@ the floor has the height `floor` (negative).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -20,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.people.anatomy import FIRST, LEG_USED, SEGMENTS, Body, Segment
-from qpsafe.sim.people.limbs import Place, axis_quaternions, bend_trunk, roll_foot, two_link
-from qpsafe.sim.people.posture import Point, Posture, Stoop, least_stoop, place_hands
+from qpsafe.sim.people.limbs import bend_trunk, roll_foot, two_link
+from qpsafe.sim.people.poses import PersonPose, PersonPoses
+from qpsafe.sim.people.posture import FINGERS, Point, Posture, Postures, Stoop, least_stoop, place_hands
 
-__all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "Segment"]
+__all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "PersonPoses", "Segment"]
 
 Array = NDArray[np.float64]
 
@@ -60,34 +60,6 @@ class Board(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PersonPose:
-    """Where every part of the person and the board is, world frame.
-
-    Attributes:
-        ends: The two end points of every capsule's axis, in the order of `SEGMENTS`, (17, 2, 3) [m].
-        positions: Centres of the capsules, (17, 3) [m].
-        quaternions: w, x, y, z; turns z into the capsules' axes, (17, 4).
-        board_position: Centre of the board, (3,) [m]; None without one, like the next two.
-        board_quaternion: w, x, y, z; board frame: x out of its face, y to its left, z up, (4,).
-        board_face: Centre of the face away from the person, (3,) [m].
-        heading: Direction the person looks [rad].
-    """
-
-    ends: Array
-    positions: Array
-    quaternions: Array
-    board_position: Array | None
-    board_quaternion: Array | None
-    board_face: Array | None
-    heading: float
-
-    @property
-    def hands(self) -> Array:
-        """Grips of the left and the right hand: the far ends of their axes (2, 3) [m]."""
-        return self.ends[[10, 16], 1]
-
-
-@dataclass(frozen=True)
 class Person:
     """The kinematics of the person: root and feet in, capsules and board out.
 
@@ -109,8 +81,17 @@ class Person:
             y: [m].
             heading: [rad].
         """
-        dx, dy = -math.sin(heading) * (self.body.hip + 0.005), math.cos(heading) * (self.body.hip + 0.005)
-        return Foot(x + dx, y + dy, heading + 0.10), Foot(x - dx, y - dy, heading - 0.10)
+        left, right = self.standing(np.array([[x, y, heading]]))[0].tolist()
+        return Foot(*left), Foot(*right)
+
+    def standing(self, roots: Array) -> Array:
+        """Rows of `Foot`, left and right, of a person who stands still: roots (T, 3) -> (T, 2, 4)."""
+        x, y, heading = roots.T
+        dx, dy = -np.sin(heading) * (self.body.hip + 0.005), np.cos(heading) * (self.body.hip + 0.005)
+        feet = np.zeros((len(roots), 2, 4))
+        feet[:, 0, :3] = np.stack((x + dx, y + dy, heading + 0.10), axis=-1)
+        feet[:, 1, :3] = np.stack((x - dx, y - dy, heading - 0.10), axis=-1)
+        return feet
 
     def pose(
         self,
@@ -120,7 +101,7 @@ class Person:
         feet: tuple[Foot, Foot] | None = None,
         posture: Posture | None = None,
     ) -> PersonPose:
-        """Place the person.
+        """Place the person: `poses` at one time.
 
         Args:
             x, y: Root, world frame [m].
@@ -131,124 +112,124 @@ class Person:
         Returns:
             The poses of all capsules and of the board.
         """
-        feet = feet or self.standing_feet(x, y, heading)
-        body, cos, sin = self.body, math.cos(heading), math.sin(heading)
-        soles = []  # ankle, heel and toe of each foot
-        for foot in feet:
-            dx, dy = foot.x - x, foot.y - y
-            soles.append(roll_foot(body, cos * dx + sin * dy, cos * dy - sin * dx, foot.yaw - heading, foot.lift))
-        board, lean, free = self.board, 0.0, posture is not None or self.board is None
-        reach, centre = (0.0, 0.0) if board is None else (board.reach, board.centre_height)
-        if not free:
-            hip = self._hip(x, y, cos, sin, feet)
-            wrists, fingers = self._edges(reach, centre)
-            shoulders = np.array([[0.0, body.shoulder, hip + body.trunk], [0.0, -body.shoulder, hip + body.trunk]])
-        else:
-            posture = posture or Posture()
-            hip, lean = self._hip_of_free(soles), posture.stoop.lean
-            reach, centre = posture.hold or (reach, centre)
-            ahead = [cos * (foot.x - x) + sin * (foot.y - y) for foot in feet]
-            edges = np.vstack((self._edges(reach, centre)[0], _FINGERS))
-            shoulders, wrists, fingers = place_hands(body, hip, posture.stoop, ahead[::-1], posture.arms, edges)
-            hip -= posture.stoop.crouch
+        places = None if feet is None else np.array([feet], dtype=float)
+        postures = None if posture is None else Postures.of(posture)
+        return self.poses(np.array([[x, y, heading]], dtype=float), places, postures)[0]
 
+    def poses(self, roots: Array, feet: Array | None = None, postures: Postures | None = None) -> PersonPoses:
+        """Place the person at T times at once.
+
+        Args:
+            roots: x, y [m] and heading [rad], world frame (T, 3).
+            feet: Rows of `Foot`, left and right (T, 2, 4); default standing still.
+            postures: What arms, back and head do; by default the board is held, or the arms hang.
+        """
+        body, board, count = self.body, self.board, len(roots)
+        feet = self.standing(roots) if feet is None else feet
+        x, y, heading = roots.T
+        cos, sin = np.cos(heading), np.sin(heading)
         # Everything in the root's frame first: x forward, y left, z up from the floor.
-        ends = np.empty((len(SEGMENTS), 2, 3))
-        ends[:5] = body.frame
-        if posture is not None:
-            bend_trunk(ends, lean, posture.gaze)
-        ends[:5, :, 2] += hip
+        dx, dy = feet[..., 0] - x[:, None], feet[..., 1] - y[:, None]
+        ahead, aside = cos[:, None] * dx + sin[:, None] * dy, cos[:, None] * dy - sin[:, None] * dx
+        yaw = feet[..., 2] - heading[:, None]
+        ankles, heels, toes = roll_foot(body, ahead, aside, yaw, feet[..., 3])
+        free = postures is not None or board is None
+        postures = postures or Postures.of(Posture())
+        hold = self._nominal if postures.hold is None else postures.hold
+        edges = self._edges(hold)
+        if free:
+            hip = self._hip_of_free(ankles)
+            shoulders, wrists, fingers = place_hands(body, hip, postures, ahead[:, ::-1], edges)
+            hip = hip - postures.stoop[:, 1]
+        else:
+            hip = self._hip(ahead, aside)
+            shoulders = np.zeros((count, 2, 3))
+            shoulders[..., 1], shoulders[..., 2] = (body.shoulder, -body.shoulder), hip[:, None] + body.trunk
+            wrists = np.broadcast_to(edges, shoulders.shape)
+            fingers = wrists + body.hand * FINGERS
 
-        roots, targets, bends = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-        for i, (side, foot) in enumerate(zip((1.0, -1.0), feet, strict=True)):
-            yaw, (ankle, heel, toe) = foot.yaw - heading, soles[i]
-            roots[i], targets[i] = (0.0, side * body.hip, hip), ankle
-            bends[i] = 1.0 + 0.5 * math.cos(yaw), 0.5 * math.sin(yaw), 0.0  # knees point forwards and along the toes
-            ends[5 + 6 * i + 2] = heel, toe
-            roots[2 + i], targets[2 + i] = shoulders[i], wrists[i]
-            # elbows down and outwards at the board; those of free arms also back, which is where hanging arms bend
-            bends[2 + i] = (-0.8, 0.35 * side, -1.0) if free else (-0.2, 0.55 * side, -1.0)
-            ends[5 + 6 * i + 5, 1] = fingers[i]
+        ends = np.empty((count, len(SEGMENTS), 2, 3))
+        ends[:, :5] = body.frame
+        if free:
+            bend_trunk(ends, postures.stoop[:, 0], postures.gaze)
+        ends[:, :5, :, 2] += hip[:, None, None]
+        # limbs in the order left leg, right leg, left arm, right arm
+        hips, bends = np.zeros((count, 2, 3)), np.empty((count, 4, 3))
+        hips[..., 1], hips[..., 2] = (body.hip, -body.hip), hip[:, None]
+        # knees point forwards and along the toes; elbows at the board down and outwards, those of free arms also back,
+        # which is where hanging arms bend
+        bends[:, :2] = np.stack((1.0 + 0.5 * np.cos(yaw), 0.5 * np.sin(yaw), np.zeros_like(yaw)), axis=-1)
+        bends[:, 2:] = [(-0.8, 0.35 * side, -1.0) if free else (-0.2, 0.55 * side, -1.0) for side in (1.0, -1.0)]
+        starts = np.concatenate((hips, shoulders), axis=1)
         upper = np.array([body.thigh, body.thigh, body.upper_arm, body.upper_arm])
         lower = np.array([body.shank, body.shank, body.forearm, body.forearm])
-        middles, tips = two_link(roots, targets, upper, lower, bends)
-        for i in (0, 1):
-            row = 5 + 6 * i
-            ends[row, 0], ends[row, 1] = middles[i], roots[i]  # thigh
-            ends[row + 1, 0], ends[row + 1, 1] = tips[i], middles[i]  # shank
-            ends[row + 3, 0], ends[row + 3, 1] = middles[2 + i], roots[2 + i]  # upper arm
-            ends[row + 4, 0], ends[row + 4, 1] = tips[2 + i], middles[2 + i]  # forearm
-            ends[row + 5, 0] = tips[2 + i]  # hand
+        middles, tips = two_link(starts, np.concatenate((ankles, wrists), axis=1), upper, lower, bends)
+        for limb, row in enumerate((5, 11, 8, 14)):
+            ends[:, row, 0], ends[:, row, 1] = middles[:, limb], starts[:, limb]  # thigh, upper arm
+            ends[:, row + 1, 0], ends[:, row + 1, 1] = tips[:, limb], middles[:, limb]  # shank, forearm
+        ends[:, [7, 13], 0], ends[:, [7, 13], 1] = heels, toes
+        ends[:, [10, 16], 0], ends[:, [10, 16], 1] = tips[:, 2:], fingers
 
-        rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        origin = np.array([x, y, self.floor])
-        ends = ends @ rotation.T + origin
-        axes = ends[:, 1] - ends[:, 0]
-        face, thickness, facing = None, 0.0, heading
-        if board is not None:
-            thickness = board.thickness
-            if posture is not None and posture.resting is not None:
-                *place, facing, centre = posture.resting
-                face = np.array([*place, centre + self.floor])
-            else:
-                face = rotation @ (reach, 0.0, centre) + origin
-        out = np.array([math.cos(facing), math.sin(facing), 0.0])
-        return PersonPose(
-            ends=ends,
-            positions=0.5 * (ends[:, 0] + ends[:, 1]),
-            quaternions=axis_quaternions(axes / np.sqrt((axes * axes).sum(axis=1))[:, None]),
-            board_position=None if face is None else face - thickness / 2 * out,
-            board_quaternion=None if face is None else np.array([math.cos(facing / 2), 0, 0, math.sin(facing / 2)]),
-            board_face=face,
-            heading=heading,
-        )
+        # ... then into the world
+        level = ends[..., :2].copy()
+        c, s = cos[:, None, None], sin[:, None, None]
+        ends[..., 0] = c * level[..., 0] - s * level[..., 1] + x[:, None, None]
+        ends[..., 1] = s * level[..., 0] + c * level[..., 1] + y[:, None, None]
+        ends[..., 2] += self.floor
+        if board is None:
+            return PersonPoses(ends, heading)
+        reach, facing = hold[:, 0], heading
+        faces = np.stack((cos * reach + x, sin * reach + y, np.broadcast_to(hold[:, 1] + self.floor, x.shape)), axis=-1)
+        if postures.resting is not None:
+            there = np.isfinite(postures.resting[:, 0])
+            facing = np.where(there, postures.resting[:, 2], heading)
+            stood = postures.resting[:, [0, 1, 3]] + (0.0, 0.0, self.floor)
+            faces = np.where(there[:, None], stood, faces)
+        return PersonPoses(ends, heading, faces, facing, board.thickness)
 
     def least_stoop(self, goals: Sequence[Point | str], hold: tuple[float, float] | None = None) -> tuple[Stoop, float]:
         """The least stoop for goals of both arms when standing, and by how much they are too short even so [m]."""
-        body, board = self.body, self.board
-        hold = hold or ((0.0, 0.0) if board is None else (board.reach, board.centre_height))
-        hip = body.ankle + LEG_USED * (body.thigh + body.shank)
-        return least_stoop(body, hip, goals, np.vstack((self._edges(*hold)[0], _FINGERS)))
+        at = self._nominal if hold is None else np.array([hold])
+        hip = self.body.ankle + LEG_USED * (self.body.thigh + self.body.shank)
+        return least_stoop(self.body, hip, goals, self._edges(at)[0])
 
-    def _edges(self, reach: float, centre: float) -> tuple[Array, Array]:
-        """Wrists and fingers (2, 3) that hold the board's edges a little below its middle; root's frame."""
-        wrists, fingers, board = np.zeros((2, 3)), np.zeros((2, 3)), self.board
-        for i, side in enumerate((1.0, -1.0) if board is not None else ()):
-            edge_x, edge_y = reach - board.thickness / 2, side * (board.width / 2 + 0.012)  # type: ignore[union-attr]
+    @property
+    def _nominal(self) -> Array:
+        """How the board is held, (1, 2)."""
+        return np.array([(0.0, 0.0) if self.board is None else (self.board.reach, self.board.centre_height)])
+
+    def _edges(self, hold: Array) -> Array:
+        """Wrists (T, 2, 3) that hold the board's edges a little below its middle; root's frame."""
+        wrists, board = np.zeros((len(hold), 2, 3)), self.board
+        if board is not None:
             # the fingertips a little past the board, whatever the length of the hand
-            wrists[i] = edge_x - max(self.body.hand - 0.02, 0.055), edge_y, centre - 0.07
-            fingers[i] = wrists[i] + self.body.hand * np.array(_FINGERS)
-        return wrists, fingers
+            wrists[..., 0] = hold[:, :1] - board.thickness / 2 - max(self.body.hand - 0.02, 0.055)
+            wrists[..., 1] = np.array([1.0, -1.0]) * (board.width / 2 + 0.012)
+            wrists[..., 2] = hold[:, 1:] - 0.07
+        return wrists
 
-    def _hip(self, x: float, y: float, cos: float, sin: float, feet: tuple[Foot, Foot]) -> float:
-        """Height of the hips.
+    def _hip(self, ahead: Array, aside: Array) -> Array:
+        """Height of the hips (T,).
 
         The farther a foot stands from below its hip, the lower the hips: the bob of an inverted pendulum. The lower
         of the two legs' wishes counts, rounded off where they cross.
         """
-        half = self.body.hip
-        leg, wishes = LEG_USED * (self.body.thigh + self.body.shank), []
-        for side, foot in zip((half, -half), feet, strict=True):
-            away = math.hypot(foot.x - x + side * sin, foot.y - y - side * cos)
-            wishes.append(math.sqrt(leg**2 - min(away, 0.5) ** 2))
-        a, b = wishes
-        return self.body.ankle + 0.5 * (a + b - math.hypot(a - b, 0.01))
+        leg = LEG_USED * (self.body.thigh + self.body.shank)
+        away = np.hypot(ahead, aside - np.array([self.body.hip, -self.body.hip]))
+        wishes = np.sqrt(leg**2 - np.minimum(away, 0.5) ** 2)
+        return self.body.ankle + _lower(wishes[:, 0], wishes[:, 1], 0.01)
 
-    def _hip_of_free(self, soles: Sequence[tuple[Place, Place, Place]]) -> float:
-        """Height of the hips of somebody who walks at any speed: as high as both legs allow, rounded off."""
+    def _hip_of_free(self, ankles: Array) -> Array:
+        """Height of the hips of somebody who walks at any speed (T,): as high as both legs allow, rounded off."""
         body, leg = self.body, LEG_USED * (self.body.thigh + self.body.shank)
-        heights = []
-        for side, ((x, y, z), _, _) in zip((body.hip, -body.hip), soles, strict=True):
-            heights.append(z + math.sqrt(leg**2 - min(math.hypot(x, y - side), 0.70 * leg) ** 2))
+        away = np.hypot(ankles[..., 0], ankles[..., 1] - np.array([body.hip, -body.hip]))
+        heights = ankles[..., 2] + np.sqrt(leg**2 - np.minimum(away, 0.70 * leg) ** 2)
         # a trailing foot on its toes, or a lifted one, would allow more than standing does
         upright = body.ankle + leg
-        left, right = heights
-        return _lower(_lower(left, right, 0.03) + 0.012, upright + 0.01, 0.02)
+        return _lower(_lower(heights[:, 0], heights[:, 1], 0.03) + 0.012, upright + 0.01, 0.02)
 
 
-def _lower(a: float, b: float, rounding: float) -> float:
+def _lower(a: Array, b: Array | float, rounding: float) -> Array:
     """The lower of two heights, rounded off where they cross [m]."""
-    return 0.5 * (a + b - math.hypot(a - b, rounding))
-
-
-_FINGERS = math.cos(0.18), 0.0, math.sin(0.18)  # at the board, from the wrist forwards and a little up
+    found: Array = 0.5 * (a + b - np.hypot(a - b, rounding))
+    return found

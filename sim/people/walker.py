@@ -10,7 +10,6 @@ average of the polyline's. A corner is cut by about 0.07 T |dv|, 0.1 m for a rig
 
 from __future__ import annotations
 
-import bisect
 import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -22,23 +21,23 @@ EASE = 0.5, 0.5  # T: at no speed [s], and what each m/s adds to it
 TURNING = math.radians(150.0)  # peak rate of a turn [rad/s]
 SHARP = math.radians(100.0)  # sharper corners are stopped at
 
+Array = NDArray[np.float64]
 Root = tuple[float, float, float]  # x [m], y [m], heading [rad]
+Roots = tuple[Array, Array, Array]  # the same at many times
 
 
-def eased(share: float) -> float:
+def eased(share: Array) -> Array:
     """From 0 to 1 for shares of time 0 to 1, at rest at both ends; the integral of the kernel. Fastest rate: 2."""
-    share = min(max(share, 0.0), 1.0)
-    return share - math.sin(2.0 * math.pi * share) / (2.0 * math.pi)
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    found: Array = share - np.sin(2.0 * math.pi * share) / (2.0 * math.pi)
+    return found
 
 
-def ramped(time: float, ease: float) -> float:
+def ramped(times: Array, ease: float) -> Array:
     """max(time, 0) smoothed by the kernel of width `ease`: the integral of `eased` [s]."""
-    if time <= -0.5 * ease:
-        return 0.0
-    if time >= 0.5 * ease:
-        return time
-    u = time / ease
-    return ease * (0.5 * u * u + 0.5 * u + 0.125 - (1.0 + math.cos(2.0 * math.pi * u)) / (4.0 * math.pi**2))
+    u = np.minimum(np.maximum(times / ease, -0.5), 0.5)
+    bend = ease * (0.5 * u * u + 0.5 * u + 0.125 - (1.0 + np.cos(2.0 * math.pi * u)) / (4.0 * math.pi**2))
+    return np.where(np.abs(times) < 0.5 * ease, bend, np.maximum(times, 0.0))
 
 
 class Piece(Protocol):
@@ -52,8 +51,8 @@ class Piece(Protocol):
     def end(self) -> float:
         """When it ends [s]."""
 
-    def __call__(self, time: float) -> Root:
-        """The root at a time in between."""
+    def __call__(self, times: Array) -> Roots:
+        """The root at times in between."""
 
 
 class Turn(NamedTuple):
@@ -64,10 +63,11 @@ class Turn(NamedTuple):
     root: Root
     angle: float
 
-    def __call__(self, time: float) -> Root:
-        """The root at a time."""
+    def __call__(self, times: Array) -> Roots:
+        """The root at times (T,)."""
         x, y, heading = self.root
-        return x, y, heading + self.angle * eased((time - self.start) / max(self.end - self.start, 1e-9))
+        turned = heading + self.angle * eased((times - self.start) / max(self.end - self.start, 1e-9))
+        return np.full_like(turned, x), np.full_like(turned, y), turned
 
 
 class Walk:
@@ -99,31 +99,28 @@ class Walk:
         self._times = start + 0.5 * self.ease + np.concatenate(([0.0], np.cumsum(lengths))) / speed
         self.end = float(self._times[-1] + 0.5 * self.ease)
         velocities = speed * legs / lengths[:, None]
-        self._changes: NDArray[np.float64] = np.diff(velocities, axis=0, prepend=0.0, append=0.0)
+        self._changes: Array = np.diff(velocities, axis=0, prepend=0.0, append=0.0)
         directions = np.arctan2(legs[:, 1], legs[:, 0])
-        self._turns: list[tuple[float, float, float]] = []  # start, duration, angle
+        turns: list[tuple[float, float, float]] = []  # start, duration, angle
         for time, angle in zip(self._times[1:-1], np.diff(directions), strict=True):
             if turning:
                 by = math.remainder(angle, 2.0 * math.pi)
                 width = min(max(self.ease, 2.0 * abs(by) / TURNING), 2.0 * (time - start), 2.0 * (self.end - time))
-                self._turns.append((time - 0.5 * width, width, by))
-        heading = root[2] + sum(by for _, _, by in self._turns)
+                turns.append((time - 0.5 * width, width, by))
+        self._turns: Array = np.array(turns).reshape(-1, 3)
+        heading = root[2] + float(self._turns[:, 2].sum())
         self.goal: Root = (float(corners[-1, 0]), float(corners[-1, 1]), heading)
 
-    def __call__(self, time: float) -> Root:
-        """The root at a time."""
-        if time >= self.end:
-            return self.goal
-        x, y, heading = self._root
-        for at, (vx, vy) in zip(self._times, self._changes, strict=True):
-            if time <= at - 0.5 * self.ease:
-                break
-            share = ramped(time - at, self.ease)
-            x += vx * share
-            y += vy * share
-        for start, duration, by in self._turns:
-            heading += by * eased((time - start) / duration)
-        return float(x), float(y), float(heading)
+    def __call__(self, times: Array) -> Roots:
+        """The root at times (T,)."""
+        times = np.asarray(times)
+        done, after = times >= self.end, times[..., None]
+        moved = (ramped(after - self._times, self.ease)[..., None] * self._changes).sum(axis=-2)
+        start, duration, by = self._turns.T
+        turned = (by * eased((after - start) / duration)).sum(axis=-1)
+        steps = (moved[..., 0], moved[..., 1], turned)
+        x, y, heading = (np.where(done, a, b + c) for a, b, c in zip(self.goal, self._root, steps, strict=True))
+        return x, y, heading
 
 
 class Course:
@@ -140,15 +137,23 @@ class Course:
         """Append a piece that starts where the last one ended; returns its end [s]."""
         self._starts.append(piece.start)
         self._pieces.append(piece)
-        self.last, self.end = piece(piece.end), piece.end
+        x, y, heading = (float(value) for value in piece(np.array(piece.end)))
+        self.last, self.end = (x, y, heading), piece.end
         return piece.end
 
-    def __call__(self, time: float) -> Root:
-        """The root at a time [s]."""
-        index = bisect.bisect_right(self._starts, time) - 1
-        return self._first if index < 0 else self._pieces[index](min(time, self._pieces[index].end))
+    def __call__(self, times: Array | float) -> Roots:
+        """The root at times [s]: x, y [m], heading [rad], each in the shape of the times."""
+        times = np.asarray(times, dtype=float)
+        which = np.searchsorted(self._starts, times, side="right") - 1
+        roots = np.broadcast_to(np.reshape(self._first, (3, *[1] * times.ndim)), (3, *times.shape)).copy()
+        for k, piece in enumerate(self._pieces):
+            now = which == k
+            if now.any():
+                roots[:, now] = piece(np.minimum(times[now], piece.end))
+        return roots[0], roots[1], roots[2]
 
-    def speed(self, time: float) -> float:
-        """Of the root, by a difference over 0.1 s [m/s]."""
-        (x1, y1, _), (x2, y2, _) = self(time - 0.05), self(time + 0.05)
-        return math.hypot(x2 - x1, y2 - y1) / 0.1
+    def speed(self, times: Array | float) -> Array:
+        """Of the root, by differences over 0.1 s [m/s]."""
+        times = np.asarray(times, dtype=float)
+        x, y, _ = self(np.stack((times - 0.05, times + 0.05)))
+        return np.asarray(np.hypot(x[1] - x[0], y[1] - y[0]) / 0.1)

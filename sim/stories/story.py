@@ -10,7 +10,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.people.person import Person, PersonPose
 from qpsafe.sim.stories.actor import Actor
 from qpsafe.sim.stories.planning import StepProblem, Taken
@@ -55,6 +57,21 @@ class Story:
     def poses(self, time: float) -> tuple[PersonPose, ...]:
         """Everybody at a time [s], for `scene.place_people`."""
         return tuple(actor.pose(time) for actor in self.people)
+
+    def track(self, times: NDArray[np.float64]) -> PersonTracks:
+        """Everybody at evenly spaced times (T,) [s], as plain arrays."""
+        poses = [actor.poses_at(times) for actor in self.people]
+        segments = [segment for person in self.persons for segment in person.body.segments]
+        boards = [(each.boards, person.board) for each, person in zip(poses, self.persons, strict=True)]
+        placed = [(at, (b.thickness, b.width, b.height)) for at, b in boards if at is not None and b is not None]
+        return PersonTracks(
+            ends=np.concatenate([each.ends for each in poses], axis=1),
+            radii=np.array([segment.radius for segment in segments]),
+            boards=np.stack([at for at, _ in placed], axis=1) if placed else np.empty((len(times), 0, 4, 4)),
+            half_sizes=0.5 * np.array([size for _, size in placed]).reshape(-1, 3),
+            dt=float(times[-1] - times[0]) / max(len(times) - 1, 1),
+            names=tuple(segment.name.removeprefix("left_").removeprefix("right_") for segment in segments),
+        )
 
     @cached_property
     def events(self) -> tuple[tuple[float, str, str], ...]:

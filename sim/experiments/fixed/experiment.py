@@ -12,6 +12,7 @@ from qpsafe.robot.state import RobotState
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.experiments.fixed.settings import FixedSettings
 from qpsafe.sim.experiments.shared.control import Control
+from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.distance import board_distance, person_distance
 from qpsafe.sim.world.plant import Plant
@@ -63,10 +64,10 @@ class FixedExperiment(FixedSettings):
     def board_distance_without_controller(self) -> NDArray[np.float64]:
         """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
         scene, walk, dt = self.scene, self.walk, 0.004
-        data = scene.make_data()
+        data, poses = scene.make_data(), PosesAhead(walk.people, dt)
         result = np.empty(round(self.duration / dt))
         for k in range(len(result)):
-            scene.place_people(data, walk.poses(k * dt))
+            scene.place_people(data, poses(k))
             result[k] = board_distance(scene, data).distance
         return result
 

@@ -13,6 +13,7 @@ from qpsafe.controller import SafetyController
 from qpsafe.danger.thresholds import robot_activation
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.robot.state import RobotState
+from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
@@ -71,12 +72,13 @@ class FixedLoop:
         spots = self.controller.spots
         assert spots is not None
         self.sensor = make_sensor(experiment.sensor, scene, spots, experiment.seed)
+        self.poses = PosesAhead(self.walk.people, self.controller.dt)
         self.k = 0
 
     def step(self, fault: Fault | None = None) -> Moment:
         """Sense, control and tell the servo; the world stands still until `advance`."""
         controller, plant = self.controller, self.plant
-        self.scene.place_people(plant.data, self.walk.poses(self.k * controller.dt))
+        self.scene.place_people(plant.data, self.poses(self.k))
         q, qd = plant.q, plant.qd
         state = controller.robot.at(q)
         distances, ages = self.sensor.read(plant.data, state), None
@@ -95,5 +97,5 @@ class FixedLoop:
 
     def copy(self) -> FixedLoop:
         """The run as it is now, to go on in another way; robot, scene, law and rays are shared."""
-        shared = (self.scene, self.scene.robot, self.walk, self.controller.law, *self.targets.values())
+        shared = (self.scene, self.scene.robot, self.walk, self.poses, self.controller.law, *self.targets.values())
         return copy.deepcopy(self, {id(item): item for item in shared})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from qpsafe.sim.experiments.pick_place.cell import Parts, Screw
 from qpsafe.sim.experiments.pick_place.gripper import Gripper
 from qpsafe.sim.experiments.pick_place.handwork import Handwork
 from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
-from qpsafe.sim.people.person import PersonPose
+from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
@@ -29,7 +28,6 @@ SCREW = Obstacle.box(
     (0.0, 0.0, 0.5 * (Screw.HEAD + Screw.SHANK)),
 )
 GRIP, RELEASE = "grip", "release"  # events of the program
-AT_REST = 1.5  # people who wait stand still from so long after they came to until as long before they go [s]
 SETTLED = 0.02  # a screw slower than this rests [m/s]
 
 
@@ -83,13 +81,13 @@ class PickLoop:
         self.handwork = Handwork(cell, self.parts, experiment.carried, self.controller.dt)
         self.falling: set[int] = set()
         self.events: list[PickEvent] = []
+        self.poses = PosesAhead(self.people, self.controller.dt)
         self.k = 0
-        self._still: dict[int, tuple[float, PersonPose]] = {}  # until when a person stands still, and how
 
     def step(self) -> Moment:
         """Sense, control, grip and tell the servo; the world stands still until `advance`."""
         controller, plant, data = self.controller, self.plant, self.plant.data
-        poses = [self._pose(number, self.k * controller.dt) for number in range(len(self.people))]
+        poses = self.poses(self.k)
         gripped = () if self.gripper.holding is None else (self.gripper.holding,)
         for deed in self.handwork.update(data, poses, gripped):
             self.events.append(PickEvent(self.k, deed.kind, deed.screw, deed.person))
@@ -122,20 +120,6 @@ class PickLoop:
         """Whether so many screws have been let go, the last one `settle` ago [s]."""
         ticks = [event.tick for event in self.events if event.kind in (RELEASE, "empty")]
         return len(ticks) >= cycles and (self.k - ticks[cycles - 1]) * self.controller.dt >= settle
-
-    def _pose(self, number: int, time: float) -> PersonPose:
-        """A person at a time [s]; computed once while he or she waits."""
-        until, pose = self._still.get(number, (-1.0, None))
-        if pose is not None and time < until:
-            return pose
-        person = self.people[number]
-        pose = person.pose(time)
-        for step in person.steps:
-            if step.do == "wait" and step.start + AT_REST < time < step.end - AT_REST:
-                self._still[number] = (step.end - AT_REST, pose)
-        if time > person.end + AT_REST:
-            self._still[number] = (math.inf, pose)
-        return pose
 
     def _act(self, name: str, data: Any) -> None:
         if name == GRIP:

@@ -19,7 +19,7 @@ TIMES = np.arange(0.0, NOMINAL.duration, DT)
 
 def root_and_board(choreography, times):
     """x, y of root and of the board's centre, and heading: (time, 5)."""
-    x, y, heading = np.array([choreography.root(t) for t in times]).T
+    x, y, heading = choreography.root(times)
     reach = choreography.person.board.reach
     return np.stack([x, y, x + reach * np.cos(heading), y + reach * np.sin(heading), heading], axis=1)
 
@@ -36,7 +36,7 @@ def test_position_and_velocity_are_continuous_and_bounded(seed):
 
 
 def test_every_part_of_the_person_moves_without_jumps():
-    ends = np.array([NOMINAL.pose(t).ends for t in TIMES])
+    ends = NOMINAL.poses_at(TIMES).ends
     speeds = np.linalg.norm(np.diff(ends, axis=0), axis=3).max(axis=(0, 2)) / DT
     for segment, speed in zip(SEGMENTS, speeds, strict=True):
         # a swinging leg is faster than the body it carries
@@ -86,7 +86,7 @@ def test_phases_follow_each_other_without_gaps(seed):
 
 def test_nobody_sinks_into_the_floor():
     radii = np.array([s.radius for s in SEGMENTS])
-    lowest = min((NOMINAL.pose(t).ends[:, :, 2].min(axis=1) - radii).min() for t in TIMES[::5])
+    lowest = (NOMINAL.poses_at(TIMES[::5]).ends[..., 2].min(axis=2) - radii).min()
     assert lowest >= NOMINAL.person.floor - 1e-9
 
 
@@ -148,7 +148,7 @@ def test_a_glide_is_monotone_ends_at_its_goal_and_keeps_its_speed(a, b, speed, r
     track = Track(a)
     end = track.glide(start, b, speed, ramp)
     times = np.linspace(start, end, 400)
-    values = np.array([track(t) for t in times])
+    values = track(times)
     step = (end - start) / 399
     assert track(start) == pytest.approx(a, abs=1e-12)
     assert track(start - 0.1) == a

@@ -12,7 +12,7 @@ WALKS = {
     "backwards": lambda t: (-0.5 * t, 0.0, 0.0),
     "sideways": lambda t: (0.0, 0.4 * t, 0.0),
     "turning": lambda t: (0.0, 0.0, 0.8 * t),
-    "arc": lambda t: (2.0 * math.cos(0.3 * t), 2.0 * math.sin(0.3 * t), 0.3 * t + math.pi / 2),
+    "arc": lambda t: (2.0 * np.cos(0.3 * t), 2.0 * np.sin(0.3 * t), 0.3 * t + math.pi / 2),
     "standing": lambda t: (1.0, 2.0, 0.5),
 }
 
@@ -46,7 +46,7 @@ def test_feet_keep_up_with_the_body(walk):
 
 def test_feet_move_without_jumps(walk):
     steps = Footsteps(Person(), walk, 8.0)
-    feet = np.array([steps(t) for t in np.arange(0.0, 8.0, 0.005)])  # (time, side, x y yaw lift)
+    feet = steps.at(np.arange(0.0, 8.0, 0.005))  # (time, side, x y yaw lift)
     assert np.abs(np.diff(feet[:, :, :2], axis=0)).max() < 0.005 * 4.0
     assert np.abs(np.diff(feet[:, :, 3], axis=0)).max() < 0.005 * 1.0
     assert feet[:, :, 3].min() >= 0.0

@@ -96,7 +96,7 @@ def story() -> Story:
 def sampled(story: Story, duration: float | None = None) -> np.ndarray:
     """Ends of all capsules of everybody (N, p, 17, 2, 3)."""
     times = np.arange(0.0, duration or story.duration + 1.0, DT)
-    return np.array([[pose.ends for pose in story.poses(t)] for t in times])
+    return np.stack([actor.poses_at(times).ends for actor in story.people], axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +131,7 @@ def test_nobody_walks_faster_than_said_and_everybody_arrives(places, speed, faci
         person(f'[[person.step]]\ndo = "walk"\nto = {to}\nspeed = {speed!r}\nfacing = "{facing}"', "start = [5.0, 5.0]")
     )
     actor = story.people[0]
-    roots = np.array([actor.root(t) for t in np.arange(0.0, story.duration + 0.1, 0.01)])
+    roots = np.stack(actor.course(np.arange(0.0, story.duration + 0.1, 0.01)), axis=1)
     steps = np.linalg.norm(np.diff(roots[:, :2], axis=0), axis=1)
     assert steps.max() <= speed * 0.01 * (1.0 + 1e-9)
     assert roots[-1, :2] == pytest.approx(places[-1], abs=1e-9)
@@ -188,7 +188,7 @@ def test_hands_are_no_faster_than_said() -> None:
     for speed in (0.3, 2.0):
         step = f'[[person.step]]\ndo = "reach"\narm = "left"\nto = [1.4, 0.3, 0.6]\nspeed = {speed}\n'
         story = parse_story(person(step + f'[[person.step]]\ndo = "retract"\nspeed = {speed}'))
-        hands = np.array([story.people[0].pose(t).hands for t in np.arange(0.0, story.duration, DT)])
+        hands = story.people[0].poses_at(np.arange(0.0, story.duration, DT)).hands
         fastest = np.linalg.norm(np.diff(hands, axis=0), axis=2).max() / DT
         assert 0.7 * speed < fastest <= speed
 
@@ -264,8 +264,10 @@ def test_a_board_stands_where_it_was_put_down_until_it_is_taken_up(story: Story)
     assert after.board_face[:2] == pytest.approx(
         (x + board.reach * math.cos(heading), y + board.reach * math.sin(heading)), abs=1e-9
     )
-    assert bo.posture(put.start).hold == (board.reach, board.centre_height)
-    before = np.array([bo.pose(t).board_position for t in np.arange(0.0, bo.end, DT)])
+    x, y, heading = bo.root(put.start)
+    face = (x + board.reach * math.cos(heading), y + board.reach * math.sin(heading))
+    assert bo.pose(put.start).board_face == pytest.approx((*face, bo.person.floor + board.centre_height), abs=1e-12)
+    before = bo.poses_at(np.arange(0.0, bo.end, DT)).centres
     assert np.linalg.norm(np.diff(before, axis=0), axis=1).max() / DT <= 0.81  # as fast as it is moved, never a jump
 
 
