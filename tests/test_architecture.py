@@ -36,6 +36,9 @@ sim.experiments.path
 sim.experiments.pick_place
 sim.replay
 sim.experiments sim.sick sim.placement
+sim.campaign.rows sim.campaign.plan
+sim.campaign.report
+sim.campaign
 sim.irc5
 cli.common cli.sheet cli.outputs
 cli cli.demos

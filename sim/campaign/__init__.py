@@ -1,1 +1,1 @@
-"""Thousands of paired encounters with people: what a controller buys, with confidence limits."""
+"""The proof: thousands of paired encounters of a robot with people."""

@@ -1,0 +1,198 @@
+"""What a campaign is: which robot does what among whom, and who is compared. A TOML file may say so.
+
+Everything that decides a trial's rows stands here, so a plan has a digest: rows of another plan, or of other code, are
+never mixed with its own. How many trials there are is no part of it: a longer campaign goes on where a shorter one
+ended.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field
+
+import qpsafe
+import qpsafe.robots
+import qpsafe.sim
+import qpsafe.tasks
+from qpsafe.errors import ConfigurationError
+from qpsafe.text.json_text import json_text
+from qpsafe.text.toml_text import TomlText
+
+MOTIONS = ("hold", "line", "pick")
+Sight = Literal["ideal", "sharp", "perfect"]
+SENSORS = get_args(Sight)
+#: Compared unless a plan says otherwise.
+CONTROLLERS = ("none", "stop", "stop_perfect_sight", "nullspace", "weighted", "strict", "paper", "default")
+FULL, QUICK = 30_000, 100
+LONGEST_LAG = 0.1  # [s]
+MOST_TRIALS = 10_000_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign, checked: what does not exist is refused.
+
+    Attributes:
+        robot: A bundled robot, or the path of a robot folder, MJCF or URDF file.
+        motions: Some of `MOTIONS`, or paths of programs (TOML); trials take turns with them.
+        controllers: Names of what is compared.
+        sensor: One of `SENSORS`, what all controllers see by that do not say otherwise.
+        lag: Of the servos, first order [s]; 0: they follow perfectly.
+        people: A TOML file with a model of people, or a story; None for the bundled model.
+        trials: How many.
+        seed: Of the first trial; that of trial k is seed + k.
+    """
+
+    robot: str = "irb140"
+    motions: tuple[str, ...] = MOTIONS
+    controllers: tuple[str, ...] = CONTROLLERS
+    sensor: str = "ideal"
+    lag: float = 0.0
+    people: str | None = None
+    trials: int = FULL
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.sensor not in SENSORS:
+            raise ConfigurationError("Plan", "sensor", self.sensor, "one of " + ", ".join(SENSORS))
+        if not 0.0 <= self.lag <= LONGEST_LAG:
+            raise ConfigurationError("Plan", "lag", self.lag, f"0 to {LONGEST_LAG} s")
+        for key, least, most in (("trials", 1, MOST_TRIALS), ("seed", 0, 2**53)):
+            value = getattr(self, key)
+            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+                raise ConfigurationError("Plan", key, value, f"a whole number from {least} to {most}")
+        for key in ("motions", "controllers"):
+            names = getattr(self, key)
+            if not isinstance(names, tuple) or not names or len(set(names)) < len(names):
+                raise ConfigurationError("Plan", key, names, "a tuple of at least one name, none of them twice")
+        for motion in self.motions:
+            if motion not in MOTIONS and not (motion.endswith(".toml") and Path(motion).is_file()):
+                expected = f"{', '.join(MOTIONS)}, or a program's file that is there"
+                raise ConfigurationError("Plan", "motions", motion, expected)
+        if self.people is not None and not Path(self.people).is_file():
+            raise ConfigurationError("Plan", "people", self.people, "a TOML file that is there")
+        known = known_controllers()
+        for name in self.controllers:
+            if name not in known:
+                raise ConfigurationError("Plan", "controllers", name, "some of " + ", ".join(known))
+
+    def seed_of(self, trial: int) -> int:
+        """Of everything random in a trial."""
+        return self.seed + trial
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+    def identity(self) -> dict[str, Any]:
+        """What decides a trial's rows: the plan but for its length, contents of its files, and the code's digest."""
+        named = self.to_dict()
+        del named["trials"]
+        files = [path for path in (self.robot, *self.motions, self.people or "") if path and Path(path).exists()]
+        return named | {"files": {path: _digest(_inside(Path(path))) for path in files}, "code": code_digest()}
+
+    def digest(self) -> str:
+        """64 hexadecimal digits that stand for `identity`."""
+        return hashlib.sha256(json_text(self.identity(), indent=None, sort_keys=True).encode()).hexdigest()
+
+    def options(self, besides: Sequence[str] = ()) -> str:
+        """Options of the command line that make this plan: those that differ from the default one.
+
+        Args:
+            besides: Keys to leave out.
+        """
+        words: list[str] = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value == field.default or field.name in besides:
+                continue
+            many = isinstance(value, tuple)
+            words += [
+                f"--{field.name}",
+                ",".join(value) if many else f"{value!r}" if field.name == "lag" else str(value),
+            ]
+        return shlex.join(words)
+
+
+_Word = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
+_Whole = Annotated[int, Field(strict=True)]
+
+
+class PlanFile(BaseModel):
+    """What the file may say; values are checked by `Plan`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    robot: _Word = Plan.robot
+    motions: list[_Word] = list(Plan.motions)
+    controllers: list[_Word] = list(Plan.controllers)
+    sensor: Sight = "ideal"
+    lag: Annotated[float, Field(strict=True)] = Plan.lag
+    people: _Word | None = None
+    trials: _Whole = Plan.trials
+    seed: _Whole = Plan.seed
+
+
+def load_plan(path: str | Path) -> Plan:
+    """A plan from its file; paths in it are relative to the file.
+
+    Raises:
+        ConfigurationError: Names file, line, key and value of what is wrong.
+    """
+    return parse_plan(TomlText.read(Path(path)), Path(path).parent)
+
+
+def parse_plan(text: TomlText, folder: Path = Path()) -> Plan:
+    """A plan from its text; see `load_plan`."""
+    said = text.checked(PlanFile)
+    tables = said.model_dump() | {"motions": tuple(said.motions), "controllers": tuple(said.controllers)}
+    tables["motions"] = tuple(str(folder / name) if name.endswith(".toml") else name for name in said.motions)
+    if said.people is not None:
+        tables["people"] = str(folder / said.people)
+    if (folder / said.robot).exists():
+        tables["robot"] = str(folder / said.robot)
+    try:
+        return Plan(**tables)
+    except ConfigurationError as wrong:
+        raise text.wrong([wrong.key], wrong.value, wrong.expected) from None
+
+
+def known_controllers() -> tuple[str, ...]:
+    """Names that can be compared: of the registry, with a user's own."""
+    try:
+        from qpsafe.sim.campaign.opponents import names  # type: ignore[import-not-found,unused-ignore]
+    except ModuleNotFoundError:  # until the registry is there
+        return CONTROLLERS
+    return names()
+
+
+@cache
+def code_digest() -> str:
+    """64 hexadecimal digits that stand for the code and the models that decide a trial's rows."""
+    packages = (qpsafe, qpsafe.tasks, qpsafe.robots, qpsafe.sim)
+    folders = [Path(path) for package in packages for path in package.__path__]
+    files = [(path.relative_to(folder), path) for folder in folders for path in _inside(folder)]
+    deciding = [path for name, path in sorted(files) if path.suffix in _CODE and not _OUTPUT & set(name.parts)]
+    return _digest(deciding)
+
+
+#: Endings of what decides, and folders of what only shows.
+_CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", "report", "plugins", "irc5"}
+
+
+def _inside(path: Path) -> list[Path]:
+    return sorted(item for item in path.rglob("*") if item.is_file()) if path.is_dir() else [path]
+
+
+def _digest(files: Sequence[Path]) -> str:
+    found = hashlib.sha256()
+    for file in files:
+        found.update(hashlib.sha256(file.read_bytes()).digest())
+    return found.hexdigest()

@@ -1,0 +1,1 @@
+"""What rows say: statistics, figures, one page and JSON."""
