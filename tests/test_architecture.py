@@ -26,7 +26,7 @@ pipeline
 tick
 controller
 plugins placement irc5 irc5.records bench
-sim.people sim.world
+sim.people sim.world sim.engine
 sim.stories sim.recording
 sim.drawing
 sim.experiments.shared
