@@ -26,8 +26,7 @@ pipeline
 tick
 controller
 plugins placement irc5 irc5.records bench
-sim.people sim.world
-sim.engine
+sim.people sim.world sim.engine
 sim.stories sim.recording
 sim.drawing
 sim.experiments.shared
@@ -36,9 +35,6 @@ sim.experiments.path
 sim.experiments.pick_place
 sim.replay
 sim.experiments sim.sick sim.placement
-sim.campaign.rows sim.campaign.plan
-sim.campaign.report
-sim.campaign
 sim.irc5
 cli.common cli.sheet cli.outputs
 cli cli.demos

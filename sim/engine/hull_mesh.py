@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ class HullMesh(NamedTuple):
         starts: First neighbour of each vertex in `neighbours`, (v + 1,).
         neighbours: Vertices at the other ends of a vertex's edges.
         planes: Outward planes (n, b) around the mesh, n·x + b <= 0 for all of it, (p, 4); none if it is not convex.
-        faces: First triangle of each plane, (p,).
+        faces: First triangle of each plane, and how many there are in all, (p + 1,).
         triangles: A corner and the two edges from it, plane by plane, (t, 9) [m].
     """
 
@@ -65,8 +66,26 @@ def hull_mesh(vertices: Array, triangles: Index) -> HullMesh:
         starts.astype(np.int64),
         edges[:, 1],
         planes,
-        np.searchsorted(owner, np.arange(len(planes))).astype(np.int64),
+        np.append(np.searchsorted(owner, np.arange(len(planes))), len(owner)).astype(np.int64),
         np.hstack((pieces[:, 0], pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])),
+    )
+
+
+def joined(meshes: Sequence[HullMesh]) -> HullMesh:
+    """The tables of several meshes, one after the other."""
+
+    def shifted(parts: list[Index], steps: list[int], last: bool = False) -> Index:
+        at = np.cumsum([0, *steps])
+        rows = [part + place for part, place in zip(parts, at, strict=False)]
+        return np.concatenate([*rows, at[-1:] if last else []]).astype(np.int64)
+
+    return HullMesh(
+        np.vstack([np.zeros((0, 3)), *(mesh.vertices for mesh in meshes)]),
+        shifted([mesh.starts[:-1] for mesh in meshes], [len(mesh.neighbours) for mesh in meshes], True),
+        shifted([mesh.neighbours for mesh in meshes], [len(mesh.vertices) for mesh in meshes]),
+        np.vstack([np.zeros((0, 4)), *(mesh.planes for mesh in meshes)]),
+        shifted([mesh.faces[:-1] for mesh in meshes], [len(mesh.triangles) for mesh in meshes], True),
+        np.vstack([np.zeros((0, 9)), *(mesh.triangles for mesh in meshes)]),
     )
 
 

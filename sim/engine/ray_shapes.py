@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, inline
+from qpsafe.compiled.compiled import Vector, add, dot, inline
 from qpsafe.sim.engine.layout import CAPSULE, CYLINDER, ELLIPSOID, PLANE, SPHERE
-from qpsafe.sim.engine.world import Index
 
 TINY = 1e-15  # of what is no direction
-EDGE = 1e-12  # by which triangles overlap, so that no ray slips between two
-BAND = 1e-5  # width in which a mesh's planes may stand off its triangles [m]
 
 
 @inline
@@ -111,52 +108,6 @@ def ray_box(o: Vector, d: Vector, a: float, b: float, c: float) -> float:
         elif abs(x) > half:
             return inf
     return _first(near, far) if near <= far else inf
-
-
-@inline
-def _ray_triangles(o: Vector, d: Vector, triangles: Array, first: int, last: int) -> float:
-    """The nearest of some triangles, from either side."""
-    best = inf
-    for i in range(first, last):
-        e, f = (triangles[i, 3], triangles[i, 4], triangles[i, 5]), (triangles[i, 6], triangles[i, 7], triangles[i, 8])
-        p = cross(d, f)
-        area = dot(e, p)
-        if area == 0.0:
-            continue
-        s = (o[0] - triangles[i, 0], o[1] - triangles[i, 1], o[2] - triangles[i, 2])
-        q = cross(s, e)
-        u, v, t = dot(s, p) / area, dot(d, q) / area, dot(f, q) / area
-        if u >= -EDGE and v >= -EDGE and u + v <= 1.0 + EDGE and 0.0 <= t < best:
-            best = t
-    return best
-
-
-@inline
-def ray_mesh(o: Vector, d: Vector, limit: float, row: Index, planes: Array, faces: Index, triangles: Array) -> float:
-    """A mesh: that of its triangles which the ray meets first, found by its planes where it is convex."""
-    near, far, front, back = -inf, inf, -1, -1
-    for k in range(row[6], row[6] + row[7]):
-        gap = planes[k, 0] * o[0] + planes[k, 1] * o[1] + planes[k, 2] * o[2] + planes[k, 3]
-        slope = planes[k, 0] * d[0] + planes[k, 1] * d[1] + planes[k, 2] * d[2]
-        if slope < 0.0:
-            if gap > -near * slope:
-                near, front = -gap / slope, k
-        elif slope > 0.0:
-            if gap > -far * slope:
-                far, back = -gap / slope, k
-        elif gap > 0.0:
-            return inf
-        if near > far:
-            return inf
-    if far < 0.0 or near > limit:
-        return inf
-    t = inf
-    if front >= 0 and near >= -BAND:
-        t = _ray_triangles(o, d, triangles, faces[front], faces[front + 1])
-    if t == inf and back >= 0 and near < BAND:
-        t = _ray_triangles(o, d, triangles, faces[back], faces[back + 1])
-    # not convex, or in the narrow band where planes stand off the triangles
-    return t if t < inf else _ray_triangles(o, d, triangles, row[8], row[8] + row[9])
 
 
 @inline

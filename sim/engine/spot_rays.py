@@ -7,36 +7,55 @@ MuJoCo. What lies in a ball that the cone does not touch is passed over.
 from __future__ import annotations
 
 from math import cos, inf, isfinite, nan, pi, sin, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import types
 
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, row
+from qpsafe.compiled.memory import view
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, place
 from qpsafe.sensing import spots
 from qpsafe.sensing.spots import ray_of
-from qpsafe.sim.engine import layout, ray_shapes
-from qpsafe.sim.engine.layout import BALL, BODY, CASE, KIND, MESH, PLANE, SCENE_BODY, SEEN, SIZE
-from qpsafe.sim.engine.ray_shapes import ray_box, ray_capsule, ray_mesh, ray_primitive
+from qpsafe.sim.engine import layout, ray_mesh, ray_shapes
+from qpsafe.sim.engine.layout import BALL, BODY, CASE, KIND, MESH, PLANE, PLANES, SCENE_BODY, SEEN, SIZE
+from qpsafe.sim.engine.ray_mesh import cone_mesh
+from qpsafe.sim.engine.ray_shapes import ray_box, ray_capsule, ray_primitive
+
+if TYPE_CHECKING:
+    from qpsafe.sim.engine.spot_table import SpotTable
+    from qpsafe.sim.engine.world import World
 
 RING = 6  # rays on the mantle of a cone, besides its axis
+RAYS = RING + 1
 _RINGS = np.array([(cos(2.0 * pi * i / RING), sin(2.0 * pi * i / RING)) for i in range(RING)])
 
-USES = (kinematics, spots, layout, ray_shapes)
+USES = (kinematics, spots, layout, ray_mesh, ray_shapes)
 
 _ints, _rows = types.Array(types.int64, 1, "C", readonly=True), types.Array(types.int64, 2, "C", readonly=True)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
 
 
+def work_size(index: Index) -> int:
+    """Numbers that `read_spots` works in, given the `World.index`."""
+    return int(4 * len(index) + 6 * RAYS + 4 * index[:, PLANES].max(initial=0))
+
+
 @inline
-def _ray(a: Vector, u: Vector, v: Vector, slant: float, i: int) -> Vector:
-    """Direction of ray i of a cone: the axis, or one of those on the mantle."""
-    if i > 0 and slant > 0.0:
-        a = add(add(a, slant * _RINGS[i - 1, 0], u), slant * _RINGS[i - 1, 1], v)
-    s = 1.0 / sqrt(dot(a, a))
-    return s * a[0], s * a[1], s * a[2]
+def _fill_fan(a: Vector, sine: float, cosine: float, fan: Array) -> None:
+    """Directions of the rays in a cone around the unit vector a: the axis, and those on the mantle, (n, 3)."""
+    # u = a × e / |a × e| with e the x axis, or the y axis where a is near x; v = a × u
+    u = (0.0, a[2], -a[1]) if abs(a[0]) < 0.8 else (-a[2], 0.0, a[0])
+    s = 1.0 / sqrt(dot(u, u))
+    u = (s * u[0], s * u[1], s * u[2])
+    v = cross(a, u)
+    fan[0, 0], fan[0, 1], fan[0, 2] = a
+    for i in range(1, fan.shape[0]):
+        x, y = sine * _RINGS[i - 1, 0], sine * _RINGS[i - 1, 1]
+        for k in range(3):
+            fan[i, k] = cosine * a[k] + x * u[k] + y * v[k]
 
 
 @inline
@@ -45,11 +64,11 @@ def _touches(o: Vector, a: Vector, sine: float, cosine: float, reach: float, c: 
     c = add(c, -1.0, o)
     along = dot(c, a)
     r += 1e-9
-    if along < -r or along > reach + r:
-        return False
-    across = sqrt(max(dot(c, c) - along * along, 0.0))
     # the distance of a point from the mantle is across cos α - along sin α
-    return across * cosine - along * sine <= r
+    across = r + along * sine
+    return (
+        -r <= along <= reach + r and (dot(c, c) - along * along) * cosine * cosine <= across * across and across >= 0.0
+    )
 
 
 @inline
@@ -74,26 +93,36 @@ def _turned(T: Array, shape: Array, v: Vector) -> Vector:
 
 
 @inline
+def _faces_plane(o: Vector, a: Vector, sine: float, cosine: float, reach: float, T: Array, shape: Array) -> bool:
+    """Whether a cone, cut off at `reach`, touches a plane from above."""
+    height = _turned(T, shape, add(o, -1.0, place(T, shape[3], shape[7], shape[11])))[2]
+    rise = _turned(T, shape, a)[2]
+    # the steepest ray of the cone falls by sin (α + the angle between axis and plane)
+    return 0.0 <= height <= reach * (sine * sqrt(max(1.0 - rise * rise, 0.0)) - rise * cosine) + 1e-9
+
+
+@inline
 def _look_at(
-    o: Vector, a: Vector, u: Vector, v: Vector, slant: float, best: float, T: Array, kind: Index, shape: Array,
-    planes: Array, faces: Index, triangles: Array,
+    o: Vector, sine: float, cosine: float, best: float, fan: Array, T: Array, kind: Index, shape: Array,
+    planes: Array, faces: Index, triangles: Array, work: Array,
 ) -> float:  # fmt: skip
     """The nearest point of a shape in a cone, if nearer than `best`."""
-    c = place(T, shape[3], shape[7], shape[11])
-    o = _turned(T, shape, add(o, -1.0, c))
-    a, u, v = _turned(T, shape, a), _turned(T, shape, u), _turned(T, shape, v)
-    for i in range(RING + 1 if slant > 0.0 else 1):
-        d = _ray(a, u, v, slant, i)
-        if kind[KIND] == MESH:
-            inner = (o[0] - shape[CASE], o[1] - shape[CASE + 1], o[2] - shape[CASE + 2])
-            # the box around it, a little larger: it is met wherever the mesh is
-            grown = 1.0 + 1e-9
-            t = ray_box(inner, d, grown * shape[CASE + 3], grown * shape[CASE + 4], grown * shape[CASE + 5])
-            if t < inf:
-                t = ray_mesh(o, d, best, kind, planes, faces, triangles)
-        else:
-            t = ray_primitive(kind[KIND], o, d, shape[SIZE], shape[SIZE + 1], shape[SIZE + 2])
-        best = min(best, t)
+    o = _turned(T, shape, add(o, -1.0, place(T, shape[3], shape[7], shape[11])))
+    if kind[KIND] != PLANE:
+        # the box around the shape, grown by as much as a cone is wide, is met by its axis wherever it is by the cone
+        inner, wide = add(o, -1.0, (shape[CASE], shape[CASE + 1], shape[CASE + 2])), best * sine + 1e-9
+        a, b, c = shape[CASE + 3] + wide, shape[CASE + 4] + wide, shape[CASE + 5] + wide
+        if ray_box(inner, _turned(T, shape, row(fan, 0)), a, b, c) == inf:
+            return best
+    own = view(work, 0, (fan.shape[0], 3))
+    for i in range(fan.shape[0]):
+        own[i, 0], own[i, 1], own[i, 2] = _turned(T, shape, row(fan, i))
+    if kind[KIND] == MESH:
+        return cone_mesh(
+            o, own, sine, cosine, best, kind, planes, faces, triangles, view(work, 3 * RAYS, (4 * kind[PLANES],))
+        )
+    for i in range(fan.shape[0]):
+        best = min(best, ray_primitive(kind[KIND], o, row(own, i), shape[SIZE], shape[SIZE + 1], shape[SIZE + 2]))
     return best
 
 
@@ -102,7 +131,7 @@ def _look_at(
         _three, _ints, _ints, _three, _one, _one,
         _rows, _two, _two, _ints, _two,
         _three, _one, _two, _three, _two,
-        types.float64[:, ::1], types.float64[::1], types.int64[::1],
+        types.float64[::1], types.float64[::1], types.int64[::1],
     ),
     *USES, compiled,
 )  # fmt: skip
@@ -134,7 +163,7 @@ def read_spots(
         bodies, unseen, rays, reaches, slants: The spots, see `SpotTable`.
         index, shapes, planes, faces, triangles: The world, see `World.seen`.
         ends, radii, balls, boards, half_sizes: People, see `PersonTracks.row`.
-        work: At least (g, 4), for g shapes.
+        work: As many numbers as `work_size` tells.
         distances: Filled with the distances read, (k,) [m]: +inf where nothing is in reach, NaN where the spot's ray
             is not finite.
         hits: Filled with what was met, (k,): the number of a shape of the world, g + the number of a person's
@@ -142,30 +171,33 @@ def read_spots(
     """
     count, segments, people = index.shape[0], radii.shape[0], balls.shape[0]
     each = segments // people if people else 0
+    globes, own = view(work, 0, (count, 4)), view(work, 4 * count + 3 * RAYS, (1,))
     for g in range(count):
         x, y, z = place(poses[index[g, BODY]], shapes[g, BALL], shapes[g, BALL + 1], shapes[g, BALL + 2])
-        work[g, 0], work[g, 1], work[g, 2], work[g, 3] = x, y, z, shapes[g, BALL + 3]
+        globes[g, 0], globes[g, 1], globes[g, 2], globes[g, 3] = x, y, z, shapes[g, BALL + 3]
     for i in range(bodies.shape[0]):
         o, a = ray_of(poses[bodies[i]], rays[i])
         hits[i] = -1
         if not (isfinite(dot(o, o)) and 0.0 < dot(a, a) < inf):
             distances[i] = nan
             continue
-        # u = a × e / |a × e| with e the x axis, or the y axis where a is near x; v = a × u
-        u = (0.0, a[2], -a[1]) if abs(a[0]) < 0.8 else (-a[2], 0.0, a[0])
-        s = 1.0 / sqrt(dot(u, u))
-        u = (s * u[0], s * u[1], s * u[2])
-        v = cross(a, u)
         slant, best = slants[i], np.nextafter(reaches[i], inf)  # what is as far as that is seen
         cosine = 1.0 / sqrt(1.0 + slant * slant)
         sine = slant * cosine
+        fan = view(work, 4 * count, (RAYS if slant > 0.0 else 1, 3))
+        s = 1.0 / sqrt(dot(a, a))
+        a = (s * a[0], s * a[1], s * a[2])
+        _fill_fan(a, sine, cosine, fan)
         for g in range(count):
             if index[g, SCENE_BODY] == unseen[i] or not index[g, SEEN]:
                 continue
-            if index[g, KIND] == PLANE or _touches(o, a, sine, cosine, best, row(work, g), work[g, 3]):
-                t = _look_at(
-                    o, a, u, v, slant, best, poses[index[g, BODY]], index[g], shapes[g], planes, faces, triangles
-                )
+            T = poses[index[g, BODY]]
+            if index[g, KIND] == PLANE:
+                touches = _faces_plane(o, a, sine, cosine, best, T, shapes[g])
+            else:
+                touches = _touches(o, a, sine, cosine, best, row(globes, g), globes[g, 3])
+            if touches:
+                t = _look_at(o, sine, cosine, best, fan, T, index[g], shapes[g], planes, faces, triangles, own)
                 if t < best:
                     best, hits[i] = t, g
         for p in range(people):
@@ -177,17 +209,43 @@ def read_spots(
                 r = radii[j] + 0.5 * sqrt(dot(axis, axis))
                 if not _touches(o, a, sine, cosine, best, add(start, 0.5, axis), r):
                     continue
-                for k in range(RING + 1 if slant > 0.0 else 1):
-                    t = ray_capsule(o, _ray(a, u, v, slant, k), start, axis, radii[j])
+                if ray_capsule(o, a, start, axis, radii[j] + best * sine + 1e-9) == inf:
+                    continue
+                for k in range(fan.shape[0]):
+                    t = ray_capsule(o, row(fan, k), start, axis, radii[j])
                     if t < best:
                         best, hits[i] = t, count + j
         for b in range(boards.shape[0]):
             T = boards[b]
             c, half = (T[0, 3], T[1, 3], T[2, 3]), row(half_sizes, b)
             if _touches(o, a, sine, cosine, best, c, sqrt(dot(half, half))):
-                for k in range(RING + 1 if slant > 0.0 else 1):
-                    d, m = _ray(a, u, v, slant, k), add(o, -1.0, c)
-                    t = ray_box(_into(T, m), _into(T, d), half[0], half[1], half[2])
+                m = _into(T, add(o, -1.0, c))
+                for k in range(fan.shape[0]):
+                    t = ray_box(m, _into(T, row(fan, k)), half[0], half[1], half[2])
                     if t < best:
                         best, hits[i] = t, count + segments + b
         distances[i] = best if hits[i] >= 0 else inf
+
+
+class SpotReader:
+    """What the spots read, for Python; it owns what the kernel works in.
+
+    Args:
+        world: The world.
+        table: The spots.
+    """
+
+    def __init__(self, world: World, table: SpotTable) -> None:
+        self._table, self._seen = table, world.seen
+        self._work = np.empty(work_size(world.index))
+
+    def read(self, poses: Array, people: tuple[Array, ...]) -> tuple[Array, Index]:
+        """Distances read, (k,) [m], and what was met, (k,), as `read_spots` says.
+
+        Args:
+            poses: Of the world's bodies, (b, 4, 4) [m], see `World`.
+            people: A row of `PersonTracks`.
+        """
+        distances, hits = np.empty(len(self._table.bodies)), np.empty(len(self._table.bodies), dtype=np.int64)
+        read_spots(np.ascontiguousarray(poses), *self._table, *self._seen, *people, self._work, distances, hits)
+        return distances, hits

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.engine import layout
-from qpsafe.sim.engine.hull_mesh import HullMesh, hull_mesh
+from qpsafe.sim.engine.hull_mesh import HullMesh, hull_mesh, joined
 from qpsafe.sim.world.robot_spec import ROBOT_COLLISION
 from qpsafe.sim.world.surroundings import SCENERY
 
@@ -107,10 +107,11 @@ class World:
         index, shapes = np.zeros((len(geoms), layout.INTEGERS), dtype=np.int64), np.zeros((len(geoms), layout.FLOATS))
         counts = np.zeros(3, dtype=np.int64)
         for row, numbers, g in zip(index, shapes, geoms, strict=True):
-            body, kind, name = model.geom_bodyid[g], int(model.geom_type[g]), model.geom(g).name
+            body, kind = model.geom_bodyid[g], int(model.geom_type[g])
             if kind not in KINDS:
-                raise ConfigurationError("World", f"geom {name}", model.geom_type[g], f"one of {', '.join(KINDS.values())}")
-            row[:4] = kind, owners[body], body, _is_seen(model, g)
+                kinds = ", ".join(KINDS.values())
+                raise ConfigurationError("World", f"geom {model.geom(g).name}", model.geom_type[g], f"one of {kinds}")
+            row[: layout.VERTEX] = kind, owners[body], body, _is_seen(model, g)
             place = np.linalg.inv(poses[owners[body]]) @ _pose(data.geom_xpos[g], data.geom_xmat[g])
             points = None
             if kind == layout.MESH:
@@ -120,35 +121,32 @@ class World:
                 row[layout.VERTEX :] = np.stack((counts, sizes), axis=1).ravel()
                 counts += sizes
             _measure(numbers, kind, place, model.geom_size[g], points)
-        fixed_box = (index[:, layout.BODY] == 0) & (index[:, layout.KIND] == layout.BOX)
+        tables = joined(meshes)
+        boxes = (index[:, layout.BODY] == 0) & (index[:, layout.KIND] == layout.BOX)
         scenery = model.geom_group[geoms] == SCENERY
         pedestal = np.array([model.geom(g).name.startswith("pedestal") for g in geoms], dtype=bool)
-        first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-        edges = np.cumsum([0, *(len(mesh.neighbours) for mesh in meshes)])
-        pieces = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
         return cls(
             names=tuple(model.geom(g).name for g in geoms),
             geoms=_frozen(geoms, np.int64),
             index=_frozen(index, np.int64),
             shapes=_frozen(shapes),
-            vertices=_frozen(np.vstack([np.zeros((0, 3)), *(mesh.vertices for mesh in meshes)])),
-            starts=_frozen(
-                np.concatenate([*(m.starts[:-1] + at for m, at in zip(meshes, edges, strict=False)), edges[-1:]]), np.int64
-            ),
-            neighbours=_frozen(
-                np.concatenate([[], *(m.neighbours + at for m, at in zip(meshes, first, strict=False))]), np.int64
-            ),
-            planes=_frozen(np.vstack([np.zeros((0, 4)), *(mesh.planes for mesh in meshes)])),
-            faces=_frozen(
-                np.concatenate([*(m.faces + at for m, at in zip(meshes, pieces, strict=False)), pieces[-1:]]), np.int64
-            ),
-            triangles=_frozen(np.vstack([np.zeros((0, 9)), *(mesh.triangles for mesh in meshes)])),
+            **{name: _frozen(table, table.dtype) for name, table in tables._asdict().items()},
             robot=_frozen(np.flatnonzero(~scenery), np.int64),
-            furniture=_frozen(np.flatnonzero(scenery & fixed_box & ~pedestal), np.int64),
+            furniture=_frozen(np.flatnonzero(scenery & boxes & ~pedestal), np.int64),
             floors=_frozen(np.flatnonzero(index[:, layout.KIND] == layout.PLANE), np.int64),
             movable=_frozen(loose if movable else [], np.int64),
             bodies=scene.robot.nq + 1 + (len(loose) if movable else 0),
         )
+
+    def take(self, chosen: Sequence[int] | Index) -> World:
+        """Some of the shapes, or all in another order; tables of vertices, planes and triangles stay as they are."""
+        rows = np.asarray(chosen, dtype=np.int64)
+        kept = {name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES}
+        tables = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
+        return replace(self, names=tuple(self.names[i] for i in rows), **tables, **kept)
+
+
+_CHOICES, _ROWS = ("robot", "furniture", "floors"), ("geoms", "index", "shapes")
 
 
 def _owners(scene: Scene) -> tuple[list[int], list[int]]:
@@ -204,7 +202,10 @@ def _measure(row: Array, kind: int, place: Array, size: Array, points: Array | N
         layout.CAPSULE: (a, a, a + b),
         layout.CYLINDER: (a, a, b),
     }.get(kind, (a, b, c))
-    centre, radius = np.zeros(3), {layout.CYLINDER: np.hypot(a, b), layout.BOX: np.linalg.norm(size)}.get(kind, max(half))
+    centre, radius = (
+        np.zeros(3),
+        {layout.CYLINDER: np.hypot(a, b), layout.BOX: np.linalg.norm(size)}.get(kind, max(half)),
+    )
     if points is not None:
         low, high = points.min(axis=0), points.max(axis=0)
         centre, half = 0.5 * (low + high), tuple(0.5 * (high - low))
