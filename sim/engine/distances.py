@@ -47,7 +47,7 @@ class Distances:
         world: The world.
         furniture: Pairs of shapes of which one is the robot's and one a piece of furniture, (m, 2).
         floors: Likewise with planes.
-        own: Pairs of the robot's own shapes, on bodies that are neither the same nor joined, and that are apart at home.
+        own: Pairs of the robot's own shapes, on bodies that are neither the same nor joined, and apart at home.
     """
 
     def __init__(self, world: World, robot: Robot) -> None:

@@ -122,7 +122,7 @@ def _core_distance(
     v = add(row(view(shape, CASE, (1, 3)), 0), -1.0, _out_of(T, row(view(others, CASE, (1, 3)), 0)))
     if not dot(v, v) > 0.0:
         v = (1.0, 0.0, 0.0)
-    count, vv, careful, at, there = 0, inf, False, kind[VERTEX], other[VERTEX]
+    count, vv, careful, apart, at, there = 0, inf, False, False, kind[VERTEX], other[VERTEX]
     for _ in range(STEPS):
         a, at = support(kind, shape, (-v[0], -v[1], -v[2]), at, careful, vertices, starts, neighbours)
         b, there = support(other, others, _into(T, v), there, careful, vertices, starts, neighbours)
@@ -133,13 +133,14 @@ def _core_distance(
             length, reached = sqrt(vv), dot(v, w)
             if reached > limit * length:
                 return inf
+            apart = apart or reached > CLOSE * length
             done = vv - reached <= length * (CLOSE + 1e-13 * length)
             for i in range(count):
                 done = done or (w[0] == corners[i, 0] and w[1] == corners[i, 1] and w[2] == corners[i, 2])
         if not done:
             for k in range(3):
                 corners[count, k], on_a[count, k], on_b[count, k] = w[k], a[k], b[k]
-            nearer = nearest_in_simplex(corners, count + 1, weights)
+            nearer = nearest_in_simplex(corners, count + 1, apart, weights)
             if nearer < vv:
                 vv, size, count = nearer, count + 1, 0
                 v, p, q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -155,7 +156,7 @@ def _core_distance(
                         count += 1
                 work[0], work[1], work[2] = p
                 work[3], work[4], work[5] = q
-                if vv <= 1e-30 * (dot(p, p) + dot(q, q)):
+                if vv <= 1e-30 * (dot(p, p) + dot(q, q)) and not apart:
                     return 0.0
                 continue
         if careful:

@@ -50,10 +50,11 @@ def on_triangle(a: Vector, b: Vector, c: Vector) -> tuple[float, Weights]:
 
 
 @inline
-def nearest_in_simplex(corners: Array, count: int, weights: Array) -> float:
+def nearest_in_simplex(corners: Array, count: int, outside: bool, weights: Array) -> float:
     """Squared distance of the origin to the simplex of the first `count` corners (4, 3); 0 inside a tetrahedron.
 
-    The corners' weights (4,) are filled: their weighted sum is the nearest point.
+    The corners' weights (4,) are filled: their weighted sum is the nearest point. Where the origin is known to be
+    `outside`, which a flat tetrahedron tells wrong, the nearest point is looked for on its faces.
     """
     for i in range(4):
         weights[i] = 0.0
@@ -75,7 +76,7 @@ def nearest_in_simplex(corners: Array, count: int, weights: Array) -> float:
         a, b, c, d = row(corners, i), row(corners, j), row(corners, k), row(corners, skip)
         n = cross(add(b, -1.0, a), add(c, -1.0, a))
         height, here = dot(n, add(d, -1.0, a)), -dot(n, a)
-        if (here > 0.0 and height > 0.0) or (here < 0.0 and height < 0.0):
+        if not outside and ((here > 0.0 and height > 0.0) or (here < 0.0 and height < 0.0)):
             continue  # the origin lies on the inner side of this face
         inside = False
         other, found = on_triangle(a, b, c)
