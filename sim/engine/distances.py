@@ -90,7 +90,7 @@ class Distances:
             at_most: Larger distances are not looked for [m].
         """
         found = np.full(7, np.nan)
-        work = np.empty(PAIR + len(pairs))
+        work = np.empty(PAIR + 3 * len(self.world.names) + len(pairs))
         p = nearest_pair(np.ascontiguousarray(poses), pairs, *self.world.solid, at_most, work, found)
         shape, other = pairs[p].tolist() if p >= 0 else (-1, -1)
         return Nearest(float(found[0]), found[1:4], found[4:], shape, other)

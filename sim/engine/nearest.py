@@ -137,21 +137,24 @@ def nearest_pair(
         pairs: Numbers of shapes, (m, 2); only the second may be a plane.
         index, shapes, vertices, starts, neighbours, planes: The world, see `World.solid`.
         at_most: Larger distances are not looked for [m].
-        work: At least PAIR + m numbers.
+        work: At least PAIR + 3 g + m numbers, for g shapes.
         found: Filled with the distance (+inf if none) and the nearest points on both, (7,) [m].
     """
     count = pairs.shape[0]
-    A, B, bounds = view(work, 0, (12,)), view(work, 12, (12,)), view(work, PAIR, (count,))
+    A, B, globes = view(work, 0, (12,)), view(work, 12, (12,)), view(work, PAIR, (index.shape[0], 3))
+    bounds = view(work, PAIR + 3 * index.shape[0], (count,))
+    for i in range(index.shape[0]):
+        globes[i, 0], globes[i, 1], globes[i, 2] = _ball_of(poses[index[i, BODY]], shapes[i])
     first, least = -1, inf
     for p in range(count):
         i, j = pairs[p, 0], pairs[p, 1]
-        a, T = _ball_of(poses[index[i, BODY]], shapes[i]), poses[index[j, BODY]]
+        c, r = row(globes, i), shapes[i, BALL + 3]
         if index[j, KIND] == PLANE:
-            _pose_of(T, shapes[j], B)
-            bound = B[2] * (a[0] - B[3]) + B[6] * (a[1] - B[7]) + B[10] * (a[2] - B[11]) - shapes[i, BALL + 3]
+            _pose_of(poses[index[j, BODY]], shapes[j], B)
+            bound = B[2] * (c[0] - B[3]) + B[6] * (c[1] - B[7]) + B[10] * (c[2] - B[11]) - r
         else:
-            c = add(a, -1.0, _ball_of(T, shapes[j]))
-            bound = sqrt(dot(c, c)) - shapes[i, BALL + 3] - shapes[j, BALL + 3]
+            c = add(c, -1.0, row(globes, j))
+            bound = sqrt(dot(c, c)) - r - shapes[j, BALL + 3]
         bounds[p] = bound
         if bound < least:
             first, least = p, bound
@@ -164,16 +167,13 @@ def nearest_pair(
         i, j = pairs[p, 0], pairs[p, 1]
         _pose_of(poses[index[i, BODY]], shapes[i], A)
         _pose_of(poses[index[j, BODY]], shapes[j], B)
-        limit = best
-        if index[j, KIND] != PLANE:
-            a, b = _ball_of(poses[index[i, BODY]], shapes[i]), _ball_of(poses[index[j, BODY]], shapes[j])
-            if (
-                _beyond(A, shapes[i], b, shapes[j, BALL + 3]) > limit
-                or _beyond(B, shapes[j], a, shapes[i, BALL + 3]) > limit
-            ):
-                continue
+        if index[j, KIND] != PLANE and (
+            _beyond(A, shapes[i], row(globes, j), shapes[j, BALL + 3]) > best
+            or _beyond(B, shapes[j], row(globes, i), shapes[i, BALL + 3]) > best
+        ):
+            continue
         distance = _measured(
-            A, index[i], shapes[i], B, index[j], shapes[j], vertices, starts, neighbours, planes, limit,
+            A, index[i], shapes[i], B, index[j], shapes[j], vertices, starts, neighbours, planes, best,
             view(work, 24, (12 + WORK,)), view(work, 24 + 12 + WORK, (7,)),
         )  # fmt: skip
         if distance < best:

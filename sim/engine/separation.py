@@ -129,11 +129,11 @@ def _core_distance(
         b = _out_of(T, b)
         w = add(a, -1.0, b)
         done = False
+        length, reached = sqrt(dot(v, v)), dot(v, w)
+        if reached > limit * length:
+            return inf
+        apart = apart or reached > CLOSE * length
         if count > 0:
-            length, reached = sqrt(vv), dot(v, w)
-            if reached > limit * length:
-                return inf
-            apart = apart or reached > CLOSE * length
             done = vv - reached <= length * (CLOSE + 1e-13 * length)
             for i in range(count):
                 done = done or (w[0] == corners[i, 0] and w[1] == corners[i, 1] and w[2] == corners[i, 2])
