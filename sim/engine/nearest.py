@@ -162,18 +162,19 @@ def nearest_pair(
     nearest, best = -1, at_most
     for k in range(-1, count):
         p = first if k < 0 else k
-        if p < 0 or (k == first) or bounds[p] > max(best, 0.0) or bounds[p] > at_most:
+        reach = max(best, 0.0)
+        if p < 0 or k == first or bounds[p] > reach:
             continue
         i, j = pairs[p, 0], pairs[p, 1]
         _pose_of(poses[index[i, BODY]], shapes[i], A)
         _pose_of(poses[index[j, BODY]], shapes[j], B)
         if index[j, KIND] != PLANE and (
-            _beyond(A, shapes[i], row(globes, j), shapes[j, BALL + 3]) > best
-            or _beyond(B, shapes[j], row(globes, i), shapes[i, BALL + 3]) > best
+            _beyond(A, shapes[i], row(globes, j), shapes[j, BALL + 3]) > reach
+            or _beyond(B, shapes[j], row(globes, i), shapes[i, BALL + 3]) > reach
         ):
             continue
         distance = _measured(
-            A, index[i], shapes[i], B, index[j], shapes[j], vertices, starts, neighbours, planes, best,
+            A, index[i], shapes[i], B, index[j], shapes[j], vertices, starts, neighbours, planes, reach,
             view(work, 24, (12 + WORK,)), view(work, 24 + 12 + WORK, (7,)),
         )  # fmt: skip
         if distance < best:
@@ -259,8 +260,8 @@ def robot_to_people(
         p = first if k < 0 else k
         if p < 0 or k == first:
             continue
-        g, j = p // other, p % other
-        if bounds[g, j] > max(best, 0.0) or bounds[g, j] > at_most:
+        g, j, reach = p // other, p % other, max(best, 0.0)
+        if bounds[g, j] > reach:
             continue
         i, kind = robot[g], _BOX
         _pose_of(poses[index[i, BODY]], shapes[i], A)
@@ -270,7 +271,7 @@ def robot_to_people(
         else:
             _board(boards[j - segments], half_sizes, j - segments, B, size)
         distance = _measured(
-            A, index[i], shapes[i], B, kind, size, vertices, starts, neighbours, planes, best,
+            A, index[i], shapes[i], B, kind, size, vertices, starts, neighbours, planes, reach,
             view(work, 24, (12 + WORK,)), view(work, 24 + 12 + WORK, (7,)),
         )  # fmt: skip
         if distance < best:

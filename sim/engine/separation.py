@@ -186,7 +186,7 @@ def separation(
         other, others: Of the second one. Only this one may be a plane.
         T: Pose of the second in the first one's frame, rows of (3, 4), (12,).
         vertices, starts, neighbours, planes: Of the world, see `World.solid`.
-        limit: Distances beyond are not computed.
+        limit: Larger distances are not computed; not below 0.
         work: `WORK` numbers; the nearest points on the surfaces, first shape's frame, are left in work[:6].
     """
     margins = shape[MARGIN] + others[MARGIN]
