@@ -79,9 +79,9 @@ class World:
         return self.index, self.shapes, self.planes, self.faces, self.triangles
 
     @property
-    def solid(self) -> tuple[Index, Array, Array, Index, Index]:
-        """What distances are measured to: index, shapes, vertices, starts, neighbours."""
-        return self.index, self.shapes, self.vertices, self.starts, self.neighbours
+    def solid(self) -> tuple[Index, Array, Array, Index, Index, Array]:
+        """What distances are measured to: index, shapes, vertices, starts, neighbours, planes."""
+        return self.index, self.shapes, self.vertices, self.starts, self.neighbours, self.planes
 
     @classmethod
     def of(cls, scene: Scene, *, movable: bool = False) -> World:

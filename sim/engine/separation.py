@@ -1,0 +1,216 @@
+"""The signed distance of two convex shapes, compiled: Gilbert, Johnson and Keerthi's algorithm.
+
+The distance of two cores is that of the origin to the set of differences a - b of their points. A simplex in that set
+is moved towards the origin by support points. With v the simplex's nearest point and w the support point against v,
+v·w / |v| <= distance <= |v|: the algorithm ends when both are the same, or when the lower one says enough.
+
+Margins are taken off afterwards, so that shapes that overlap by less than these have their true depth. Where cores
+overlap, the depth added to the margins is the shortest of some shifts that part them: along the normals of their faces,
+their axes and the line of their centres. It is no less than the true depth, and the same where a face is nearest.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from numba import types
+
+from qpsafe.compiled import compiled
+from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, row
+from qpsafe.compiled.memory import view
+from qpsafe.robot.kinematics import Index
+from qpsafe.sim.engine import layout, simplex
+from qpsafe.sim.engine import support as supports
+from qpsafe.sim.engine.layout import CASE, KIND, MARGIN, MESH, PLANE, PLANES, PLANES_FROM, VERTEX
+from qpsafe.sim.engine.simplex import nearest_in_simplex
+from qpsafe.sim.engine.support import support
+
+CLOSE = 1e-12  # difference of upper and lower bound that ends the search, beside 1e-13 of the distance [m]
+STEPS = 128  # enough for round shapes, polytopes need about ten; what is reached then is still an upper bound
+WORK = 64  # numbers that `separation` works in
+
+USES = (layout, simplex, supports, compiled)
+
+_ints, _one, _two = (types.Array(kind, n, "C", readonly=True) for kind, n in
+                     ((types.int64, 1), (types.float64, 1), (types.float64, 2)))  # fmt: skip
+shape_types = (_ints, _one, _ints, _one, _one)
+hull_types = (_two, _ints, _ints, _two)
+
+
+@inline
+def _into(T: Array, d: Vector) -> Vector:
+    """A direction in the axes of a frame at T (12,)."""
+    return (
+        T[0] * d[0] + T[4] * d[1] + T[8] * d[2],
+        T[1] * d[0] + T[5] * d[1] + T[9] * d[2],
+        T[2] * d[0] + T[6] * d[1] + T[10] * d[2],
+    )
+
+
+@inline
+def _out_of(T: Array, p: Vector) -> Vector:
+    """A point of a frame at T (12,)."""
+    return (
+        T[0] * p[0] + T[1] * p[1] + T[2] * p[2] + T[3],
+        T[4] * p[0] + T[5] * p[1] + T[6] * p[2] + T[7],
+        T[8] * p[0] + T[9] * p[1] + T[10] * p[2] + T[11],
+    )
+
+
+@inline
+def _shift(
+    kind: Index, shape: Array, other: Index, others: Array, T: Array, n: Vector,
+    vertices: Array, starts: Index, neighbours: Index,
+) -> float:  # fmt: skip
+    """How far the second core must move along the unit vector n to be parted from the first one."""
+    a, _ = support(kind, shape, n, kind[VERTEX], True, vertices, starts, neighbours)
+    m = _into(T, n)
+    b, _ = support(other, others, (-m[0], -m[1], -m[2]), other[VERTEX], True, vertices, starts, neighbours)
+    return dot(n, a) - dot(n, _out_of(T, b))
+
+
+@inline
+def _depth(
+    kind: Index, shape: Array, other: Index, others: Array, T: Array,
+    vertices: Array, starts: Index, neighbours: Index, planes: Array, work: Array,
+) -> float:  # fmt: skip
+    """The shortest of some shifts that part two cores; its direction in work[6:9]."""
+    best = inf
+    c = add(_out_of(T, row(view(others, CASE, (1, 3)), 0)), -1.0, row(view(shape, CASE, (1, 3)), 0))
+    length = sqrt(dot(c, c))
+    mine = kind[PLANES] if kind[KIND] == MESH else 0
+    his = other[PLANES] if other[KIND] == MESH else 0
+    for i in range(7 + mine + his):
+        n = (0.0, 0.0, 1.0) if length == 0.0 else (c[0] / length, c[1] / length, c[2] / length)
+        if 0 < i < 4:
+            n = (1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0, 1.0 if i == 3 else 0.0)
+        elif 4 <= i < 7:
+            n = (T[i - 4], T[i], T[i + 4])
+            if dot(n, n) < 0.5:  # the frame of a person's capsule has one axis only
+                continue
+        elif 7 <= i < 7 + mine:
+            n = row(planes, kind[PLANES_FROM] + i - 7)
+        elif i >= 7 + mine:
+            n = row(planes, other[PLANES_FROM] + i - 7 - mine)
+            origin = (T[3], T[7], T[11])
+            n = add(_out_of(T, n), -1.0, origin)
+        for sign in (1.0, -1.0):
+            m = (sign * n[0], sign * n[1], sign * n[2])
+            shift = _shift(kind, shape, other, others, T, m, vertices, starts, neighbours)
+            if shift < best:
+                best = shift
+                work[6], work[7], work[8] = m
+    return max(best, 0.0)
+
+
+@inline
+def _core_distance(
+    kind: Index, shape: Array, other: Index, others: Array, T: Array,
+    vertices: Array, starts: Index, neighbours: Index, limit: float, work: Array,
+) -> float:  # fmt: skip
+    """Distance of two cores, 0 if they overlap, +inf if it is larger than `limit`.
+
+    The nearest points are in work[:6], in the first shape's frame.
+    """
+    corners, on_a, on_b, weights = (
+        view(work, 9, (4, 3)),
+        view(work, 21, (4, 3)),
+        view(work, 33, (4, 3)),
+        view(work, 45, (4,)),
+    )
+    # any direction will do to begin with; that of the line of centres is good
+    v = add(row(view(shape, CASE, (1, 3)), 0), -1.0, _out_of(T, row(view(others, CASE, (1, 3)), 0)))
+    if not dot(v, v) > 0.0:
+        v = (1.0, 0.0, 0.0)
+    count, vv, careful, apart, at, there = 0, inf, False, False, kind[VERTEX], other[VERTEX]
+    for _ in range(STEPS):
+        a, at = support(kind, shape, (-v[0], -v[1], -v[2]), at, careful, vertices, starts, neighbours)
+        b, there = support(other, others, _into(T, v), there, careful, vertices, starts, neighbours)
+        b = _out_of(T, b)
+        w = add(a, -1.0, b)
+        done = False
+        length, reached = sqrt(dot(v, v)), dot(v, w)
+        if reached > limit * length:
+            return inf
+        apart = apart or reached > CLOSE * length
+        if count > 0:
+            done = vv - reached <= length * (CLOSE + 1e-13 * length)
+            for i in range(count):
+                done = done or (w[0] == corners[i, 0] and w[1] == corners[i, 1] and w[2] == corners[i, 2])
+        if not done:
+            for k in range(3):
+                corners[count, k], on_a[count, k], on_b[count, k] = w[k], a[k], b[k]
+            nearer = nearest_in_simplex(corners, count + 1, apart, weights)
+            if nearer < vv:
+                vv, size, count = nearer, count + 1, 0
+                v, p, q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+                if size == 4 and vv == 0.0:
+                    return 0.0
+                for i in range(size):
+                    s = weights[i]
+                    if s > 0.0:
+                        v = add(v, s, row(corners, i))
+                        p, q = add(p, s, row(on_a, i)), add(q, s, row(on_b, i))
+                        for k in range(3):
+                            corners[count, k], on_a[count, k], on_b[count, k] = corners[i, k], on_a[i, k], on_b[i, k]
+                        count += 1
+                work[0], work[1], work[2] = p
+                work[3], work[4], work[5] = q
+                if vv <= 1e-30 * (dot(p, p) + dot(q, q)) and not apart:
+                    return 0.0
+                continue
+        if careful:
+            break
+        careful = True  # look at all vertices once more
+    return sqrt(vv)
+
+
+@entry(types.float64(*shape_types, *hull_types, types.float64, types.float64[::1]), *USES)
+def separation(
+    kind: Index,
+    shape: Array,
+    other: Index,
+    others: Array,
+    T: Array,
+    vertices: Array,
+    starts: Index,
+    neighbours: Index,
+    planes: Array,
+    limit: float,
+    work: Array,
+) -> float:
+    """The signed distance of two shapes, +inf if it is larger than `limit` (or NaN).
+
+    Args:
+        kind, shape: Rows of `World.index` and `World.shapes` of the first shape; its pose does not matter.
+        other, others: Of the second one. Only this one may be a plane.
+        T: Pose of the second in the first one's frame, rows of (3, 4), (12,).
+        vertices, starts, neighbours, planes: Of the world, see `World.solid`.
+        limit: Larger distances are not computed; not below 0.
+        work: `WORK` numbers; the nearest points on the surfaces, first shape's frame, are left in work[:6].
+    """
+    margins = shape[MARGIN] + others[MARGIN]
+    if other[KIND] == PLANE:
+        n = (T[2], T[6], T[10])
+        a, _ = support(kind, shape, (-n[0], -n[1], -n[2]), kind[VERTEX], True, vertices, starts, neighbours)
+        a = add(a, -shape[MARGIN], n)
+        height = dot(n, a) - (n[0] * T[3] + n[1] * T[7] + n[2] * T[11])
+        work[0], work[1], work[2] = a
+        work[3], work[4], work[5] = add(a, -height, n)
+        return height if height <= limit else inf
+    gap = _core_distance(kind, shape, other, others, T, vertices, starts, neighbours, limit + margins, work)
+    if gap == inf:
+        return inf
+    a, b = (work[0], work[1], work[2]), (work[3], work[4], work[5])
+    n = add(b, -1.0, a)
+    length = sqrt(dot(n, n))
+    if gap > 0.0 and length > 0.0:
+        n = (n[0] / length, n[1] / length, n[2] / length)
+    else:
+        gap = -_depth(kind, shape, other, others, T, vertices, starts, neighbours, planes, work)
+        n = (work[6], work[7], work[8])
+        a, _ = support(kind, shape, n, kind[VERTEX], True, vertices, starts, neighbours)
+        b = add(a, gap, n)
+    work[0], work[1], work[2] = add(a, shape[MARGIN], n)
+    work[3], work[4], work[5] = add(b, -others[MARGIN], n)
+    return gap - margins
