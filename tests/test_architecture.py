@@ -35,6 +35,8 @@ sim.experiments.path
 sim.experiments.pick_place
 sim.replay
 sim.experiments sim.sick sim.placement
+sim.campaign
+sim.campaign.report
 sim.irc5
 cli.common cli.sheet cli.outputs
 cli cli.demos

@@ -45,7 +45,7 @@ class Plan:
         controllers: Names of what is compared.
         sensor: One of `SENSORS`, what all controllers see by that do not say otherwise.
         lag: Of the servos, first order [s]; 0: they follow perfectly.
-        people: A TOML file with a model of people, or a story; None for the bundled model.
+        people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
         trials: How many.
         seed: Of the first trial; that of trial k is seed + k.
     """
@@ -76,8 +76,10 @@ class Plan:
             if motion not in MOTIONS and not (motion.endswith(".toml") and Path(motion).is_file()):
                 expected = f"{', '.join(MOTIONS)}, or a program's file that is there"
                 raise ConfigurationError("Plan", "motions", motion, expected)
-        if self.people is not None and not Path(self.people).is_file():
-            raise ConfigurationError("Plan", "people", self.people, "a TOML file that is there")
+        if self.people is not None and not Path(self.people).exists():
+            raise ConfigurationError(
+                "Plan", "people", self.people, "a TOML file, or a folder of stories, that is there"
+            )
         known = known_controllers()
         for name in self.controllers:
             if name not in known:

@@ -176,26 +176,23 @@ class Bootstrap:
         self.drawn: dict[tuple[str, Statistic], Array] = {
             (name, item): np.empty(resamples) for name in values for item in wanted[name]
         }
-        orders = {name: np.argsort(column, kind="stable") for name, column in values.items()}
+        trials = lengths.pop() if lengths else 1
+        means = [key for key in self.drawn if key[1].quantile is None]
+        ranked = [(key, _Ranks(values[key[0]], key[1].quantile)) for key in self.drawn if key[1].quantile is not None]
+        # one matrix product gives all means, and how many of a resample lie before each window of ranks
+        columns = [values[name] for name, _ in means] + [ranks.before for _, ranks in ranked]
+        products = np.stack(columns, axis=1) if columns else np.empty((trials, 0))
         done = 0
-        for weights in _weights(lengths.pop() if lengths else 1, resamples, seed):
+        for weights in _weights(trials, resamples, seed):
             rows = slice(done, done + len(weights))
-            for name, column in values.items():
-                self._draw(name, wanted[name], column[orders[name]], weights[:, orders[name]], rows)
+            sums = weights @ products
+            for k, key in enumerate(means):
+                self.drawn[key][rows] = sums[:, k] / trials
+            for k, (key, ranks) in enumerate(ranked, start=len(means)):
+                self.drawn[key][rows] = ranks.quantiles(weights, sums[:, k])
             done = rows.stop
             if progress is not None:
                 progress(done)
-
-    def _draw(self, name: str, wanted: Sequence[Statistic], rising: Array, weights: NDArray, rows: slice) -> None:
-        """Statistics of resamples, given as how often each of the rising values is in them."""
-        upto = None
-        for item in wanted:
-            if item.quantile is None:
-                self.drawn[name, item][rows] = weights @ rising / len(rising)
-                continue
-            upto = np.cumsum(weights, axis=1, dtype=np.int32) if upto is None else upto
-            need = max(int(np.ceil(item.quantile * len(rising) - 1e-9)), 1)
-            self.drawn[name, item][rows] = rising[(upto >= need).argmax(axis=1)]
 
     def estimate(self, name: str, item: Statistic) -> Estimate:
         """A figure with its limits."""
@@ -209,10 +206,48 @@ class Bootstrap:
             second: Name of another one.
             item: Statistic of both.
         """
-        drawn = self.drawn[first, item] - self.drawn[second, item]
+        a, b = self.drawn[first, item], self.drawn[second, item]
+        drawn = np.where(np.isclose(a, b, rtol=1e-12, atol=0.0), 0.0, a - b)  # sums of the same numbers may be rounded
         value = item.of(self.values[first]) - item.of(self.values[second])
         beside = min((drawn <= 0.0).sum(), (drawn >= 0.0).sum())
         return Estimate(value, *_limits(drawn), min(2.0 * (1.0 + float(beside)) / (1.0 + len(drawn)), 1.0))
+
+
+class _Ranks:
+    """Quantiles of resamples of a column, from how often each trial is in them.
+
+    A quantile's rank hardly moves: of a resample, about Q of the n trials lie before rank Q, give or take
+    √(Q (1 - Q/n)). So only a window of ranks, seven such deviations to both sides, is looked at one by one.
+
+    Args:
+        column: One value a trial, (n,).
+        quantile: Which.
+    """
+
+    def __init__(self, column: Array, quantile: float | None) -> None:
+        count = len(column)
+        rank = (quantile or 0.0) * count
+        self.need = max(int(np.ceil(rank - 1e-9)), 1)
+        room = 7.0 * np.sqrt(rank * (1.0 - rank / count)) + 2.0
+        first, end = max(int(rank - room), 0), min(int(rank + room) + 1, count)
+        self.order = np.argsort(column, kind="stable")
+        self.window = slice(first, end)
+        self.rising = column[self.order]
+        self.before = np.zeros(count)  # 1 where a trial's rank is before the window
+        self.before[self.order[:first]] = 1.0
+
+    def quantiles(self, weights: Array, before: Array) -> Array:
+        """Of resamples.
+
+        Args:
+            weights: How often each trial is in each, (m, n).
+            before: How many trials of each lie before the window, (m,).
+        """
+        upto = np.cumsum(weights[:, self.order[self.window]], axis=1) + before[:, None]
+        found = self.rising[self.window][(upto >= self.need).argmax(axis=1)]
+        for k in np.flatnonzero((before >= self.need) | (upto[:, -1] < self.need)):  # next to never: all ranks
+            found[k] = self.rising[(np.cumsum(weights[k, self.order]) >= self.need).argmax()]
+        return found
 
 
 def _weights(trials: int, resamples: int, seed: int) -> Iterator[Array]:

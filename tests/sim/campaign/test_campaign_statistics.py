@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.report.statistics import MEAN, MEDIAN, Bootstrap, Statistic, holm, mcnemar, share
+from qpsafe.sim.campaign.report.statistics import MEAN, MEDIAN, Bootstrap, Statistic, _Ranks, holm, mcnemar, share
 
 P10, P95 = Statistic(0.1), Statistic(0.95)
 ALL = (MEAN, MEDIAN, P10, P95)
@@ -96,6 +96,20 @@ def test_a_quantile_is_numpys_order_statistic_in_every_resample(values: list[flo
     np.testing.assert_array_equal(made.drawn["x", item], expected)
     np.testing.assert_allclose(made.drawn["x", MEAN], data[drawn].mean(axis=1), atol=1e-10)
     assert made.estimate("x", item).value == np.quantile(data, quantile, method="inverted_cdf")
+
+
+@pytest.mark.parametrize("quantile", [0.001, 0.1, 0.5, 0.95, 1.0])
+def test_quantiles_of_many_trials_are_found_in_a_window_of_ranks_and_outside(quantile: float) -> None:
+    data = np.random.default_rng(1).gamma(2.0, size=5000).round(2)  # with ties
+    drawn = np.random.default_rng(9).integers(5000, size=(40, 5000))
+    expected = np.quantile(data[drawn], quantile, axis=1, method="inverted_cdf")
+    ranks = _Ranks(data, quantile)
+    assert ranks.window.stop - ranks.window.start < 600
+    weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float)
+    np.testing.assert_array_equal(ranks.quantiles(weights, weights @ ranks.before), expected)
+    lopsided = np.zeros((2, 5000))
+    lopsided[0, data.argmin()] = lopsided[1, data.argmax()] = 5000.0
+    assert ranks.quantiles(lopsided, lopsided @ ranks.before).tolist() == [data.min(), data.max()]
 
 
 def test_limits_agree_with_scipys_paired_percentile_bootstrap() -> None:

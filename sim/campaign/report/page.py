@@ -1,0 +1,210 @@
+"""The report: one page with everything in it, for the screen, a phone and paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.report.figures import distance_figure, energy_figure, harm_figure, kinds_figure, svg
+from qpsafe.sim.campaign.report.html import Html, element, joined, page, table
+from qpsafe.sim.campaign.report.measures import FIGURES, SHARES, FigureMeasure, ShareMeasure, percent
+from qpsafe.sim.campaign.rows import COLUMNS, of_controller
+from qpsafe.sim.campaign.runner import Results
+from qpsafe.text.words import counted
+
+LEVEL = 0.05
+
+
+def report_page(results: Results, found: dict[str, Any]) -> str:
+    """The page.
+
+    Args:
+        results: With the rows, for distributions.
+        found: Their summary.
+    """
+    return page(f"Campaign: {counted(found['trials']['finished'], 'trial')}", *_sections(results, found))
+
+
+def show_command(plan: Plan, trial: int, controller: str) -> str:
+    """The command that plays a trial again.
+
+    Args:
+        plan: Of the campaign.
+        trial: Its number.
+        controller: Who is to be seen.
+    """
+    return f"qpsafe campaign show {trial} --controller {controller} {plan.options(('trials', 'controllers'))}".rstrip()
+
+
+def _sections(results: Results, found: dict[str, Any]) -> Iterator[Html]:
+    controllers = found["controllers"]
+    rows = {name: of_controller(results.columns, name) for name in controllers}
+    done, planned = found["trials"]["finished"], found["trials"]["planned"]
+    yield element("h1", f"Campaign: {counted(len(controllers), 'controller')}, {counted(done, 'trial')}")
+    rest = "" if done == planned else f" It is not finished: {done:,} of {planned:,} trials."
+    yield element(
+        "p",
+        f"The same people, on the same seeds {found['seeds'][0]} to {found['seeds'][1]}, meet a robot under every "
+        f"controller.{rest} Small print under a number: its limits at 95 %.",
+        class_="soft",
+    )
+    yield _findings(found["findings"])
+    yield element("h2", "Harm against cycle time")
+    yield _figure(svg(harm_figure(controllers), "harm"), "Boxes: limits at 95 % in both directions. Best is down left.")
+    yield element("h2", "Contacts and work")
+    yield _shares(controllers)
+    yield _figures(controllers)
+    yield element("h2", "Kinds of contact")
+    yield _figure(
+        svg(kinds_figure(controllers), "kinds"), "What the robot's touching point did one tick before contact."
+    )
+    yield element("h2", "Distances and energies")
+    yield _figure(svg(distance_figure(rows), "distance"), "All trials; up to the largest controller's 95 %.")
+    yield _figure(svg(energy_figure(rows), "energy"), "All trials; those without contact count as 0.")
+    yield element("h2", "Compared, trial by trial")
+    for reference in found["references"]:
+        yield _compared(found, reference)
+    yield element("h2", "By motion")
+    yield _motions(controllers)
+    yield element("h2", "The worst trials")
+    for name in controllers:
+        yield _worst(results.plan, name, found["worst"][name])
+    yield element("h2", "How it was counted")
+    yield element("ul", *(element("li", text) for text in found["statistics"]["methods"]))
+    yield element("p", _size(found["statistics"]))
+    yield from _definitions()
+    yield element("h2", "The plan")
+    yield table(("key", "value"), [(key, _words(value)) for key, value in found["plan"].items()], text=2)
+    yield table(("made with", "version"), list(found["versions"].items()), text=2)
+    yield element("p", _times(found["engine"]), class_="soft", id="times")
+
+
+def _findings(faults: list[str]) -> Html:
+    if not faults:
+        text = "No controller passed a joint limit, gave a bad command, or was worse for people than no control."
+        return element("p", text, class_="fine")
+    return element(
+        "div", element("strong", "Faults"), element("ul", *(element("li", f) for f in faults)), class_="fault"
+    )
+
+
+def _figure(image: str, caption: str) -> Html:
+    return element("figure", Html(image), element("figcaption", caption))
+
+
+def _cell(value: str, below: str) -> Html:
+    return joined((value, element("small", below)))
+
+
+def _share(found: dict[str, Any], measure: ShareMeasure) -> Html:
+    low, high = found["intervals"][measure.name]
+    count = found[measure.name]
+    none = found["none_of_n"].get(measure.name)
+    limits = f"{percent(low)} to {percent(high)} %" if none is None else f"below {100 * none['rule_of_three']:.2g} %"
+    return _cell(f"{count:,} ({percent(count / found['trials'])} %)", limits)
+
+
+def _shares(controllers: dict[str, Any]) -> Html:
+    lines = [[name, *(_share(found, measure) for measure in SHARES)] for name, found in controllers.items()]
+    return table(["trials with", *(measure.title for measure in SHARES)], lines)
+
+
+def _figures(controllers: dict[str, Any]) -> Html:
+    def cell(found: dict[str, Any], measure: FigureMeasure) -> Html:
+        low, high = found["intervals"][measure.name]
+        return _cell(measure.shown(found[measure.name]), f"{measure.shown(low)} to {measure.shown(high)}")
+
+    lines = [[name, *(cell(found, measure) for measure in FIGURES)] for name, found in controllers.items()]
+    return table(["mean or quantile", *(f"{m.title} [{m.unit}]" if m.unit != "1" else m.title for m in FIGURES)], lines)
+
+
+def _compared(found: dict[str, Any], reference: str) -> Html:
+    """Differences to a reference; bold where they are significant."""
+    measures: dict[str, ShareMeasure | FigureMeasure] = {m.name: m for m in (*SHARES, *FIGURES) if m.compared}
+    lines: dict[str, list[str]] = {}
+    for item in (item for item in found["comparisons"] if item["reference"] == reference):
+        measure, (low, high) = measures[item["measure"]], item["interval"]
+        if isinstance(measure, FigureMeasure):
+            value, limits = measure.shown(item["difference"], True), f"{measure.shown(low)} to {measure.shown(high)}"
+        else:
+            value = percent(item["difference"], True)
+            limits = f"+{item['only_controller']}, -{item['only_reference']} trials"
+        small = element("small", limits, element("br"), f"p = {item['p_holm']:.2g}")
+        head = element("strong", value) if item["p_holm"] < LEVEL else value
+        lines.setdefault(item["controller"], []).append(joined((head, small)))
+    heads = [
+        f"{m.title} [{'% of trials' if isinstance(m, ShareMeasure) else m.unit}]".replace(" [1]", "")
+        for m in measures.values()
+    ]
+    caption = (
+        f"Less {reference}: differences with limits, or trials in which it happened to the one only; p after "
+        f"correction, bold below {LEVEL}."
+    )
+    return joined((element("p", caption), table(["controller", *heads], [[k, *v] for k, v in lines.items()])))
+
+
+def _motions(controllers: dict[str, Any]) -> Html:
+    motions = sorted({motion for found in controllers.values() for motion in found["motions"]})
+    lines = []
+    for name, found in controllers.items():
+        cells = [found["motions"][motion] for motion in motions]
+        texts = [f"{c['contacts']} of {c['trials']}" for c in cells]
+        limits = [f"{percent(c['interval'][0])} to {percent(c['interval'][1])} %" for c in cells]
+        lines.append([name, *map(_cell, texts, limits)])
+    return table(["trials with contact", *motions], lines)
+
+
+def _worst(plan: Plan, name: str, cases: list[dict[str, Any]]) -> Html:
+    lines = [
+        (
+            str(case["trial"]),
+            case["contact_class"],
+            case["contact_region"] or "-",
+            case["motion"],
+            f"{1e3 * case['distance']:.0f}",
+            f"{case['closing_speed']:.2f}" if case["contact"] else "-",
+            f"{case['energy_share']:.2f}" if case["contact"] else "-",
+            element("code", show_command(plan, case["trial"], name)),
+        )
+        for case in cases
+    ]
+    heads = (
+        "trial",
+        "contact",
+        "part",
+        "motion",
+        "distance [mm]",
+        "closing [m/s]",
+        "energy / limit",
+        "to see it again",
+    )
+    opened = {"open": ""} if name == "default" else {}
+    return element("details", element("summary", name), table(heads, lines, text=4), **opened)
+
+
+def _size(said: dict[str, Any]) -> str:
+    return f"Here: {said['comparisons']:,} comparisons, {said['resamples']:,} resamples."
+
+
+def _definitions() -> Iterator[Html]:
+    shares = [(m.title, m.name, "trials", m.meaning) for m in SHARES]
+    figures = [(m.title, m.name, m.unit, m.meaning) for m in FIGURES]
+    heads = ("measure", "in JSON", "shown in", "definition")
+    yield element("details", element("summary", "Measures"), table(heads, shares + figures, text=4))
+    columns = [(c.name, c.unit, c.meaning) for c in COLUMNS]
+    yield element(
+        "details", element("summary", "Columns of a row"), table(("column", "unit", "definition"), columns, text=3)
+    )
+
+
+def _words(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, tuple | list) else "-" if value is None else str(value)
+
+
+def _times(engine: dict[str, Any]) -> str:
+    wall = "" if engine["wall_s"] is None else f", {engine['wall_s']:.0f} s from beginning to end"
+    return (
+        f"{engine['simulated_s']:,.0f} simulated seconds in {engine['processes_s']:,.0f} s of processes{wall}: "
+        f"{engine['simulated_s_per_wall_s']:.1f} simulated seconds a second and process."
+    )

@@ -1,0 +1,225 @@
+"""The worst that can happen under a controller: a search among all encounters that the model of people allows.
+
+An encounter is a point of the unit cube. A quarter of the budget is random; from the worst of that, CMA-ES climbs in the
+coordinates in which an encounter is continuous, those that choose between things kept, one start after the other. As
+many random trials are played beside it, to see what searching is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError, MissingExtraError
+
+Array = NDArray[np.float64]
+
+NEAR = 0.05  # smallest distance below which a case is kept [m]
+WANTED = 10  # cases that a search should find
+UNLIKE = 0.1  # of the unit cube's edge, in one coordinate at least: cases that differ less are the same one
+RUNS = 4  # starts that a budget lasts for at least
+STEP = 0.15  # first standard deviation of a climb, of the cube's edge
+LEAST = 40  # trials
+_BATCH = 64
+
+#: Plays encounters: points (k, d) -> their rows.
+Evaluate = Callable[[Array], Sequence[dict[str, Any]]]
+
+
+class Case(NamedTuple):
+    """An encounter that was played.
+
+    Attributes:
+        u: Its point of the unit cube, (d,).
+        row: What came of it.
+    """
+
+    u: tuple[float, ...]
+    row: dict[str, Any]
+
+    @property
+    def near(self) -> bool:
+        """Whether it is kept: contact, or less than `NEAR`."""
+        return bool(self.row["contact"] or self.row["distance"] < NEAR)
+
+    @property
+    def harm(self) -> float:
+        """What the search maximises; what is no number is no harm."""
+        value = float(self.row["search"])
+        return value if np.isfinite(value) else -np.inf
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found, and random trials of the same number.
+
+    Attributes:
+        budget: Trials of either.
+        searched: Cases of the search that are near, the worst first.
+        random: Those of the random trials.
+        worst: The worst of the search, near or not.
+        worst_random: The worst of the random trials.
+        unlike: Of `searched`: cases that differ from each other and from all in `random`.
+    """
+
+    budget: int
+    searched: tuple[Case, ...]
+    random: tuple[Case, ...]
+    worst: Case
+    worst_random: Case
+    unlike: tuple[Case, ...]
+
+    @property
+    def sentence(self) -> str:
+        """What it comes to, in words."""
+        touched, near = (sum(bool(case.row["contact"]) for case in cases) for cases in (self.searched, self.random))
+        text = (
+            f"{self.budget:,} searched trials: {len(self.searched):,} nearer than {1e3 * NEAR:.0f} mm, {touched:,} of "
+            f"them contacts; {self.budget:,} random ones: {len(self.random):,} and {near:,}. {len(self.unlike):,} of the "
+            "searched are unlike each other and unlike all random ones."
+        )
+        if len(self.unlike) < WANTED:
+            text += f" The search could not find {WANTED}."
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON; `cases` are those of `unlike`, then the rest of `searched`."""
+        rest = [case for case in self.searched if case not in self.unlike]
+        return {
+            "budget": self.budget,
+            "sentence": self.sentence,
+            "unlike": len(self.unlike),
+            "searched": len(self.searched),
+            "random": len(self.random),
+            "worst": self.worst._asdict(),
+            "worst_random": self.worst_random._asdict(),
+            "cases": [case._asdict() for case in (*self.unlike, *rest)],
+        }
+
+
+def search_worst(
+    evaluate: Evaluate,
+    dimensions: int,
+    budget: int,
+    seed: int = 0,
+    continuous: NDArray[np.bool_] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Found:
+    """Search, and compare with random trials.
+
+    Args:
+        evaluate: Plays encounters, many at a time.
+        dimensions: d, of the cube.
+        budget: Trials for the search, and as many again for the comparison.
+        seed: Of everything random.
+        continuous: Coordinates to climb in, (d,); all by default.
+        progress: Called with the trials that are done, and how many there are.
+
+    Raises:
+        MissingExtraError: cma is not installed.
+        ConfigurationError: The budget is too small.
+    """
+    if budget < LEAST:
+        raise ConfigurationError("search_worst", "budget", budget, f"at least {LEAST} trials")
+    free = np.ones(dimensions, dtype=bool) if continuous is None else np.asarray(continuous, dtype=bool)
+    done = 0
+
+    def play(points: Array) -> list[Case]:
+        nonlocal done
+        found = [Case(tuple(u.tolist()), dict(row)) for u, row in zip(points, evaluate(points), strict=True)]
+        done += len(found)
+        if progress is not None:
+            progress(done, 2 * budget)
+        return found
+
+    searched = list(_searched(play, np.random.default_rng((seed, 0)), dimensions, budget, free))
+    beside = _at_random(play, np.random.default_rng((seed, 1)), dimensions, budget)
+    near, near_random = (_by_harm(case for case in cases if case.near) for cases in (searched, beside))
+    return Found(
+        budget,
+        near,
+        near_random,
+        _by_harm(searched)[0],
+        _by_harm(beside)[0],
+        tuple(_unlike(near, near_random)),
+    )
+
+
+def _at_random(play: Callable[[Array], list[Case]], rng: np.random.Generator, d: int, count: int) -> list[Case]:
+    points = rng.random((count, d))
+    return [case for first in range(0, count, _BATCH) for case in play(points[first : first + _BATCH])]
+
+
+def _searched(
+    play: Callable[[Array], list[Case]], rng: np.random.Generator, d: int, budget: int, free: NDArray[np.bool_]
+) -> Iterator[Case]:
+    """Random cases, then climbs from the worst of them, until the budget is spent."""
+    explored = _at_random(play, rng, d, budget // 4)
+    yield from explored
+    left = budget - len(explored)
+    most = max(left // RUNS, 1)
+    for start in _by_harm(explored):
+        for case in _climb(play, rng, np.array(start.u), free, min(most, left)):
+            left -= 1
+            yield case
+        if left <= 0:
+            return
+
+
+def _climb(
+    play: Callable[[Array], list[Case]], rng: np.random.Generator, start: Array, free: NDArray[np.bool_], budget: int
+) -> Iterator[Case]:
+    """CMA-ES from a case, until it stands still or its budget is spent."""
+    try:
+        import cma
+    except ImportError as error:
+        raise MissingExtraError(f"to search needs cma: pip install 'qpsafe[campaign]' ({error})") from error
+
+    if free.sum() < 2:  # nothing that CMA-ES could adapt to
+        points = np.tile(start, (budget, 1))
+        points[:, free] = rng.random((budget, int(free.sum())))
+        yield from play(points)
+        return
+    options = {
+        "bounds": [0.0, 1.0],
+        "seed": np.nan,  # its random numbers are ours
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "verbose": -9,
+        "verb_log": 0,
+        "tolfun": 1e-6,
+        "tolx": 1e-4,
+    }
+    strategy = cma.CMAEvolutionStrategy(np.clip(start[free], 1e-6, 1.0 - 1e-6), STEP, options)
+    while budget > 0 and not strategy.stop():
+        asked = np.array(strategy.ask())
+        points = np.tile(start, (len(asked), 1))
+        points[:, free] = np.clip(asked, 0.0, 1.0)
+        if len(points) > budget:  # the last few cannot be told to it
+            yield from play(points[:budget])
+            return
+        cases = play(points)
+        strategy.tell(asked, [min(-case.harm, 1e9) for case in cases])
+        budget -= len(cases)
+        yield from cases
+
+
+def _by_harm(cases: Iterator[Case] | Sequence[Case]) -> tuple[Case, ...]:
+    return tuple(sorted(cases, key=lambda case: -case.harm))
+
+
+def _unlike(near: Sequence[Case], others: Sequence[Case]) -> Iterator[Case]:
+    """Cases that differ from the others, and from each other, in one coordinate at least."""
+    if not near:
+        return
+    taken = np.full((len(others) + len(near), len(near[0].u)), np.inf)
+    taken[: len(others)] = [case.u for case in others] or np.zeros((0, len(near[0].u)))
+    count = len(others)
+    for case in near:
+        if (np.abs(taken[:count] - case.u).max(axis=1, initial=0.0) >= UNLIKE).all():
+            taken[count] = case.u
+            count += 1
+            yield case
