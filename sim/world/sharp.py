@@ -65,11 +65,12 @@ class SharpSensors:
         count: k.
         model: Figures.
         seed: Of spread and noise; equal seeds give equal voltages.
+        noise: Seed of other noise of the same units.
     """
 
-    def __init__(self, count: int, model: SharpModel | None = None, seed: int = 0) -> None:
+    def __init__(self, count: int, model: SharpModel | None = None, seed: int = 0, noise: int | None = None) -> None:
         self.model = model = SharpModel() if model is None else model
-        self._rng = np.random.default_rng((seed, 1))
+        self._rng = np.random.default_rng((seed, 1) if noise is None else (seed, 1, noise))
         spread = np.random.default_rng((seed, 0))
         gain, offset = 1.0 + model.spread * np.clip(spread.normal(size=(2, count)), -2.5, 2.5)
         bias = model.bias_spread * np.clip(spread.normal(size=count), -2.5, 2.5)

@@ -1,0 +1,68 @@
+"""Speed and separation monitoring of every link against every seen point: what stop and scaling have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.danger.separation import Separation
+from qpsafe.sensing.detection import BadInput
+from qpsafe.sim.engine.bodies import Bodies
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.station import Station
+
+Array = NDArray[np.float64]
+
+FAR = 2.0  # beyond this from the robot nothing limits its speed: v_max is above 2 m/s there [m]
+
+
+class Gaps(NamedTuple):
+    """Every moving body of the robot against every seen point, those within `FAR` of each other.
+
+    Attributes:
+        distances: Between the body's true shape and the point (k,) [m].
+        rows: nᵀ J of the body's nearest point (k, n), n towards the seen point: times q̇ the speed of approach.
+    """
+
+    distances: Array
+    rows: Array
+
+
+class Monitor:
+    """Sees points and tells how near, and how fast nearer, every body of the robot comes to each of them.
+
+    Args:
+        station: With robot, sensors and scene.
+        separation: Figures of the monitor; by default a_s as measured for the station's motion.
+    """
+
+    def __init__(self, station: Station, separation: Separation | None = None) -> None:
+        self.separation = Separation(station.deceleration) if separation is None else separation
+        self.robot = station.robot
+        self._bodies = Bodies(station.world, station.robot)
+        self._sensing = station.controller().sensing
+
+    def gaps(self, q: Array, qd: Array, distances: ArrayLike | None, points: ArrayLike | None) -> Gaps | None:
+        """What is near; None where too many sensors cannot be trusted.
+
+        Args:
+            q: Measured (n,) [rad].
+            qd: Measured (n,) [rad/s].
+            distances: Of the spots (k,) [m].
+            points: Instead (p, 3) [m].
+        """
+        state = self.robot.at(q)
+        if distances is None:
+            seen = np.asarray(points, dtype=float).reshape(-1, 3)
+        elif self._sensing is None:
+            raise BadInput("distances are given but the robot has no spots")
+        else:
+            found = self._sensing.update(state, state.wire(qd), np.asarray(distances, dtype=float))
+            if found.too_many:
+                return None
+            seen = found.points
+        near = self._bodies.to_points(state, seen, FAR)
+        return Gaps(near.distance, near.rows)

@@ -1,0 +1,90 @@
+"""Speed and separation monitoring as path speed scaling: as fast along the path as the nearest person permits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qpsafe.danger.separation import Separation
+from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
+from qpsafe.sim.campaign.opponents.monitor import Monitor
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.tasks.trajectory import Trajectory
+    from qpsafe.tick import Tick
+
+Array = NDArray[np.float64]
+
+RAMP = 0.2  # from standstill to the full rate [s]
+_LEAST = 1e-4  # an approach slower than this at the full rate needs no scaling [m/s]
+
+
+class Clocked:
+    """A trajectory on a clock of its own, which runs at a rate that somebody sets.
+
+    Args:
+        trajectory: What is followed.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        self.time, self.rate = 0.0, 0.0
+
+    def sample(self, _: float) -> Any:
+        """The reference of now, whatever time is asked for."""
+        return self.full().slowed(self.rate)
+
+    def full(self) -> Any:
+        """The reference at the full rate."""
+        return self._trajectory.sample(self.time)
+
+
+class PathScaling:
+    """Follows the path at the largest rate at which no body approaches a seen point faster than v_max.
+
+    Args:
+        station: What the robot does.
+        separation: Figures of the monitor; measured ones by default.
+    """
+
+    def __init__(self, station: Station, separation: Separation | None = None) -> None:
+        self._clock = Clocked(station.reference)
+        self._controller = station.controller(trajectory=self._clock)
+        self._monitor = Monitor(station, separation)
+        self._robot, self._dt = station.robot, self._controller.dt
+        self._speed = max(station.speed, 0.05)
+
+    def step(self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None) -> Tick:
+        """One tick, as `SafetyController.step`.
+
+        Args:
+            q: Measured (n,) [rad].
+            qd: Measured (n,) [rad/s].
+            distances: Of the spots (k,) [m].
+            points: Instead (p, 3) [m].
+        """
+        gaps, clock, separation = self._monitor.gaps(q, qd, distances, points), self._clock, self._monitor.separation
+        allowed = 0.0
+        if gaps is not None and not len(gaps.distances):
+            allowed = 1.0
+        elif gaps is not None:
+            # q̇ at the full rate, as far as the tool says what it is
+            frame = self._robot.tool_frames[0]
+            full = np.linalg.lstsq(self._robot.jacobian(frame, q), clock.full().twist, rcond=None)[0]
+            approach, most = gaps.rows @ full, separation.speed(gaps.distances)
+            nearing = approach > _LEAST
+            allowed = float(min(1.0, *(most[nearing] / approach[nearing]))) if nearing.any() else 1.0
+        # falls as fast as a stop that S_p reckons with, rises smoothly
+        fall = separation.deceleration * self._dt / self._speed
+        clock.rate = min(max(allowed, clock.rate - fall), clock.rate + self._dt / RAMP)
+        tick = self._controller.step(q, qd, points=_NOBODY)
+        clock.time += clock.rate * self._dt
+        phase = FOLLOWING if clock.rate > 0.0 else SUSPENDED
+        return replace(tick, path_time=clock.time, phase=phase)
+
+
+_NOBODY = np.empty((0, 3))

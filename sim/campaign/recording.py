@@ -1,0 +1,125 @@
+"""One run of one controller through one encounter, tick by tick: the general way, for whatever follows the contract.
+
+The robot follows perfectly: measured at tick k is what tick k - 1 asked for; or with a servo's lag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.sim.campaign.opponents.registry import NOTHING, SPOTS
+from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.opponents.registry import Opponent
+    from qpsafe.sim.campaign.senses import Senses
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.tick import Tick
+
+Array = NDArray[np.float64]
+
+STATUSES = (OK, DEGRADED, BAD_INPUT, FAULT)
+DT = 0.004  # [s]
+_NOBODY = np.empty((0, 3))
+Observer = Callable[[int, Array, "Tick"], None]
+
+
+class Recording(NamedTuple):
+    """T ticks of n joints.
+
+    Attributes:
+        dt: Tick [s].
+        q, qd: Measured (T, n) [rad, rad/s].
+        reference_q, reference_qd: What was asked for (T, n).
+        phase: ``following``, ``suspended`` or ``recovering`` (T,).
+        path_time: Clock of the path (T,) [s].
+        status: Number in `STATUSES` (T,).
+        points: What counted as seen at each tick (p, 3) [m].
+    """
+
+    dt: float
+    q: Array
+    qd: Array
+    reference_q: Array
+    reference_qd: Array
+    phase: NDArray[np.str_]
+    path_time: Array
+    status: NDArray[np.int64]
+    points: list[Array]
+
+
+class Servo:
+    """The robot's joints: they follow a reference at once, or `lag` later as joints of second order do.
+
+    Args:
+        q: Where they start (n,) [rad].
+        lag: Delay between a reference and its use, in whole ticks [s]; 0 for perfect following.
+        omega: Natural frequency of the joints where there is a lag [rad/s]; critically damped.
+    """
+
+    def __init__(self, q: Array, lag: float = 0.0, omega: float = 100.0) -> None:
+        self.q, self.qd = q.copy(), np.zeros_like(q)
+        self._delay, self._omega = round(lag / DT), omega
+        self._waiting: list[tuple[Array, Array]] = []
+
+    def follow(self, q: Array, qd: Array) -> None:
+        """Move for one tick.
+
+        Args:
+            q: Position at the end of the tick (n,) [rad].
+            qd: Velocity (n,) [rad/s].
+        """
+        if self._delay == 0:
+            self.q, self.qd = q, qd
+            return
+        self._waiting.append((q, qd))
+        if len(self._waiting) <= self._delay:
+            return
+        goal, speed = self._waiting.pop(0)
+        # e'' = -2 ω e' - ω² e for e = q - q_ref, q_ref = goal - qd (DT - t): solved exactly over the tick
+        w, t = self._omega, DT
+        e, de = self.q - (goal - speed * DT), self.qd - speed
+        decay, c = np.exp(-w * t), de + w * e
+        self.q = goal + decay * (e + c * t)
+        self.qd = speed + decay * (c - w * (e + c * t))
+
+
+def record(
+    station: Station, entry: Opponent, senses: Senses, ticks: int, lag: float = 0.0, observer: Observer | None = None
+) -> Recording:
+    """Run one controller.
+
+    Args:
+        station: What the robot does where.
+        entry: The controller.
+        senses: What it is told, fresh.
+        ticks: T.
+        lag: Of the servo [s].
+        observer: Called after every tick with its number, the measured position (n,) [rad] and what was answered.
+    """
+    controls, n = entry.make(station), station.robot.nq
+    servo = Servo(station.start, lag)
+    run = np.empty((4, ticks, n))
+    path_time, status = np.empty(ticks), np.empty(ticks, dtype=np.int64)
+    phases, points = [], []
+    for k in range(ticks):
+        q, qd = servo.q, servo.qd
+        if entry.sight == NOTHING:
+            tick = controls.step(q, qd, points=_NOBODY)
+        elif entry.sight == SPOTS:
+            tick = controls.step(q, qd, senses.distances(q, k))
+        else:
+            tick = controls.step(q, qd, points=senses.nearest(q, k))
+        reference = tick.reference
+        run[0, k], run[1, k], run[2, k], run[3, k] = q, qd, reference.q, reference.qd
+        path_time[k], status[k] = tick.path_time, STATUSES.index(tick.status)
+        phases.append(tick.phase)
+        points.append(tick.points)
+        if observer is not None:
+            observer(k, q, tick)
+        servo.follow(reference.q, reference.qd)
+    return Recording(DT, *run, np.array(phases), path_time, status, points)

@@ -1,0 +1,88 @@
+"""What a controller is told in a trial: what the spots read, Sharp sensors or ideal ones, or where everybody is."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.sensing.detection import nearest_link
+from qpsafe.sensing.sharp import SharpConverter
+from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sim.engine.bodies import Bodies
+from qpsafe.sim.engine.spot_rays import SpotReader
+from qpsafe.sim.engine.spot_table import SpotTable
+from qpsafe.sim.world.sharp import SharpModel, SharpSensors
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.engine.tracks import PersonTracks
+
+Array = NDArray[np.float64]
+
+LOOK = 5.0  # how far a Sharp sensor is moved by what it sees [m]
+SIGHT = 2.0  # how far perfect sight looks [m]
+UNITS = 0  # seed of the units: the robot has the same sensors in all trials, noise is each trial's own
+
+
+class Senses:
+    """Readings of one run.
+
+    Args:
+        station: With the robot and its spots.
+        tracks: Everybody.
+        sensor: ``ideal`` or ``sharp``; with ``perfect`` nobody asks for readings.
+        seed: Of the sensors' noise.
+    """
+
+    def __init__(self, station: Station, tracks: PersonTracks, sensor: str, seed: int) -> None:
+        self._station, self._tracks = station, tracks
+        spots = load_spots(station.robot)
+        assert spots is not None  # a station without them is refused
+        self.spots: SpotArray = spots
+        reach = LOOK if sensor == "sharp" else None
+        self._reader = SpotReader(station.world, SpotTable.of(station.scene, spots, reach))
+        robot = station.robot
+        self._bodies = Bodies(station.world, robot)
+        self._link_bodies = np.array([robot.mounting(end)[0] for _, end in robot.wire_frames])
+        self._sharp: SharpSensors | None = None
+        if sensor == "sharp":
+            self._sharp = SharpSensors(len(spots), SharpModel(), UNITS, noise=seed)
+            self._converter = _identified(spots.names, tuple(spots.range_max))
+
+    def distances(self, q: Array, k: int) -> Array:
+        """What the spots read at tick k with the robot at q (n,) [rad]; (k,) [m]."""
+        poses = self._station.robot.at(q).body_poses()
+        found, self._hits = self._reader.read(poses, self._tracks.row(k))
+        self._true = found
+        if self._sharp is None:
+            return found
+        return self._converter.distances(self._sharp.sample(found))
+
+    def people_seen(self, q: Array) -> Array:
+        """Where the last readings met people (p, 3) [m]; q (n,) as then."""
+        met = self._hits >= len(self._station.world.names)
+        origins, directions = self.spots.rays(self._station.robot.at(q))
+        return np.asarray(origins[met] + self._true[met, None] * directions[met])
+
+    def nearest(self, q: Array, k: int) -> Array:
+        """Where everybody is nearest to each link of the robot at tick k (p, 3) [m], as far as `SIGHT`.
+
+        A point belongs to the link of the wire that it is nearest to, as points given to a controller do; it counts if
+        it is the nearest one of this link's body, so that nobody counts once for every body of the robot.
+        """
+        state = self._station.robot.at(q)
+        near = self._bodies.to_people(state, self._tracks.row(k), SIGHT)
+        if not len(near.distance):
+            return near.on_other
+        links = nearest_link(near.on_other, state.wire(np.zeros_like(q)))
+        return near.on_other[self._link_bodies[links] == near.body]
+
+
+@cache
+def _identified(names: tuple[str, ...], ranges: tuple[float, ...]) -> SharpConverter:
+    """The curves that a calibration of the units finds; the same for all trials."""
+    fits = SharpSensors(len(names), SharpModel(), UNITS).identified(names)
+    return SharpConverter([fit.curve for fit in fits], np.array(ranges))

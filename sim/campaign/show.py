@@ -1,0 +1,123 @@
+"""One trial played again, in the whole scene: a video, and a table of every tick."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.sim.campaign.closest import closest
+from qpsafe.sim.campaign.recording import DT
+from qpsafe.sim.campaign.trial import encounter, measures, recorded
+from qpsafe.sim.drawing.film import Film
+from qpsafe.sim.world.scene import build_scene
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.plan import Plan
+    from qpsafe.sim.campaign.recording import Recording
+    from qpsafe.sim.campaign.trial import Encounter
+    from qpsafe.tick import Tick
+
+Array = NDArray[np.float64]
+
+
+class Shown(NamedTuple):
+    """A trial that was played again.
+
+    Attributes:
+        row: Its measures, as in the campaign.
+        table: The CSV file.
+        video: The mp4, None without one.
+    """
+
+    row: dict[str, Any]
+    table: Path
+    video: Path | None
+
+
+def show(
+    plan: Plan, trial: int, controller: str, out: Path, *,
+    video: bool = True, u: Array | None = None, progress: Callable[[float], None] | None = None,
+) -> Shown:  # fmt: skip
+    """Play a trial again; its row has every bit that it had in the campaign.
+
+    Args:
+        plan: The campaign.
+        trial: Number from 0.
+        controller: Name of one.
+        out: Folder of the files, which is made if need be.
+        video: Whether to draw.
+        u: Point of the people's cube instead of the trial's own, e.g. one that the search for the worst has found.
+        progress: Told the share that is done.
+
+    Raises:
+        MissingExtraError: A video without the extra "video".
+    """
+    met = encounter(plan, trial, u)
+    ticks = len(met.tracks)
+    out.mkdir(parents=True, exist_ok=True)
+    name = f"trial-{trial}-{controller.replace(':', '-').replace('/', '-')}"
+    answers: list[tuple[float, float, float, str]] = []
+
+    def note(k: int, q: Array, tick: Tick) -> None:
+        answers.append((tick.cdf_n, tick.m, tick.f, tick.regime))
+        if progress is not None:
+            progress((k + 1) / ticks)
+
+    movie = None
+    if video:
+        movie = out / f"{name}.mp4"
+        run = _filmed(plan, met, controller, movie, note)
+    else:
+        run = recorded(plan, met, controller, note)
+    table = out / f"{name}.csv"
+    _write_table(table, met, run, answers)
+    return Shown(measures(plan, met, controller, run), table, movie)
+
+
+def _filmed(plan: Plan, met: Encounter, controller: str, path: Path, note: Callable[..., None]) -> Recording:
+    """Play it before the camera."""
+    place, story = met.station, met.story
+    furnish = None if place.cell is None else place.cell.furnish
+    scene = build_scene(place.robot, pedestal=place.pedestal, people=story.persons, furnish=furnish)
+    data, usual = scene.make_data(place.start), place.controller()
+    assert usual.spots is not None
+    with Film(path, scene, usual.spots, usual.activation) as film:
+
+        def observe(k: int, q: Array, tick: Tick) -> None:
+            note(k, q, tick)
+            if k % film.every == 0:
+                data.qpos[scene.q_addresses] = q
+                scene.place_people(data, story.poses(k * DT))
+                film.observe(tick, scene, SimpleNamespace(scene=scene, data=data, q=q))  # type: ignore[arg-type]
+
+        return recorded(plan, met, controller, observe)
+
+
+def _write_table(path: Path, met: Encounter, run: Recording, answers: list[tuple[float, float, float, str]]) -> None:
+    """Every tick as a row, the file whole or not at all."""
+    near = closest(met.station, run.q, met.tracks)
+    joints = met.station.robot.joint_names
+    head = ["time [s]", "distance [m]", "body", "part", "points seen", "cdf_n", "m", "f", "regime", "phase", "status",
+            "path time [s]", *(f"q {j} [rad]" for j in joints), *(f"qd {j} [rad/s]" for j in joints)]  # fmt: skip
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(head)
+            for k, (cdf_n, m, f, regime) in enumerate(answers):
+                figures = (f"{value:.9g}" for value in (*run.q[k], *run.qd[k]))
+                writer.writerow(
+                    [f"{k * run.dt:.3f}", f"{near.distance[k]:.6f}", met.station.world.body_name(near.body[k]),
+                     met.tracks.part(near.segment[k]), len(run.points[k]), f"{cdf_n:.6g}", f"{m:.6g}", f"{f:.6g}",
+                     regime, run.phase[k], run.status[k], f"{run.path_time[k]:.6f}", *figures]
+                )  # fmt: skip
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)

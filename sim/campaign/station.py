@@ -1,0 +1,212 @@
+"""Where a trial takes place and what the robot does there: hold a pose, a line, pick-and-place, or a user's program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.controller import SafetyController
+from qpsafe.danger.thresholds import robot_activation
+from qpsafe.errors import ConfigurationError
+from qpsafe.robot.loader import load_robot
+from qpsafe.sim.campaign.floor_plan import FloorPlan
+from qpsafe.sim.engine.distances import Distances
+from qpsafe.sim.engine.world import World
+from qpsafe.sim.experiments.fixed.stage import robot_stage
+from qpsafe.sim.experiments.pick_place.cell import PROGRAM as PICK
+from qpsafe.sim.experiments.pick_place.cell import Cell
+from qpsafe.sim.world.known import known_obstacles
+from qpsafe.sim.world.scene import Scene, build_scene
+from qpsafe.tasks.orientation import OrientationTask
+from qpsafe.tasks.position import PositionTask
+from qpsafe.tasks.program import Program
+from qpsafe.tasks.program_file import load_program
+from qpsafe.tasks.reach import joints_for
+from qpsafe.tasks.trajectory import FixedPose, Trajectory
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+    from qpsafe.sensing.hulls import Obstacle
+    from qpsafe.tasks.task import Task
+
+Array = NDArray[np.float64]
+
+LINE = Path(__file__).with_name("line.toml")
+#: Motions that have a name; any other is the path of a program's file.
+MOTIONS = ("hold", "line", "pick")
+
+
+@dataclass(frozen=True)
+class Station:
+    """A robot at its work.
+
+    Attributes:
+        motion: One of `MOTIONS`, or the path of a program.
+        robot: The robot, with spots.
+    """
+
+    motion: str
+    robot: Robot
+
+    @cached_property
+    def cell(self) -> Cell | None:
+        """Tables, support and box of the third experiment, without screws; None where nothing but the pedestal is."""
+        return Cell(full=0) if self.motion == "pick" else None
+
+    @cached_property
+    def pedestal(self) -> float:
+        """Height of the robot's base above the floor [m]."""
+        return robot_stage(self.robot).pedestal
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The world without people."""
+        furnish = None if self.cell is None else self.cell.furnish
+        return build_scene(self.robot, pedestal=self.pedestal, people=(), furnish=furnish)
+
+    @cached_property
+    def world(self) -> World:
+        """The same as flat arrays for the engine."""
+        return World.of(self.scene)
+
+    @cached_property
+    def distances(self) -> Distances:
+        """Pairs of shapes that must not touch: the robot's and furniture, floor, its own."""
+        return Distances(self.world, self.robot)
+
+    @cached_property
+    def floor_plan(self) -> FloorPlan:
+        """The cell as people see it."""
+        robot, rng = self.robot, np.random.default_rng(3)
+        wires = [robot.wire(rng.uniform(robot.lower, robot.upper), np.zeros(robot.nq)) for _ in range(500)]
+        reach = max(float(np.hypot(*wire.ends[:, :2].T).max()) for wire in wires)
+        tool = robot.pose(robot.tool_frames[0], self.start)[:3, 3]
+        return FloorPlan.of(self.scene, tuple(tool.tolist()), reach)
+
+    @cached_property
+    def known(self) -> tuple[Obstacle, ...]:
+        """What of it the controller knows."""
+        return tuple(known_obstacles(self.scene))
+
+    @cached_property
+    def program(self) -> Program | None:
+        """What the first tool follows; None where it stays where it is."""
+        if self.motion == "hold":
+            return None
+        return load_program({"line": LINE, "pick": PICK}.get(self.motion, Path(self.motion)), self.robot)
+
+    @property
+    def reference(self) -> Trajectory:
+        """Of the first tool."""
+        first = self.robot.tool_frames[0]
+        return self.program or FixedPose(self.robot.pose(first, self.robot.home))
+
+    @cached_property
+    def start(self) -> Array:
+        """Joint position at the beginning (n,) [rad]."""
+        if self.program is None:
+            return self.robot.home
+        return joints_for(self.robot, self.robot.tool_frames[0], self.program.sample(0.0).pose, self.robot.home)
+
+    def tasks(self, trajectory: Trajectory | None = None) -> list[Task]:
+        """Where all tools are, over how they are turned; the first one follows its reference, or another one.
+
+        Args:
+            trajectory: Instead of `reference`.
+        """
+        first, *others = self.robot.tool_frames
+        targets = {first: trajectory or self.reference}
+        targets |= {name: FixedPose(self.robot.pose(name, self.start)) for name in others}
+        kinds = PositionTask, OrientationTask
+        return [kind(name, target) for kind in kinds for name, target in targets.items()]
+
+    def controller(self, law: Any = None, trajectory: Trajectory | None = None, **parts: Any) -> SafetyController:
+        """A controller for this work, with the station's tasks, thresholds and known obstacles.
+
+        Args:
+            law: The law; the controller's default if None.
+            trajectory: Of the first tool, instead of `reference`.
+            parts: More arguments of `SafetyController`.
+        """
+        count = len(self.robot.tool_frames)
+        given = {"known": self.known, "activation": robot_activation(self.robot, count, count), **parts}
+        return SafetyController(self.robot, self.tasks(trajectory), law, **given)
+
+    @cached_property
+    def deceleration(self) -> float:
+        """a_s: the smallest deceleration of a stop from the motion, or from 0.5 m/s where there is none [m/s²].
+
+        Measured in the robot's model: every joint brakes at its acceleration limit; a_s = v²/(2 s) of the points of the
+        wire that go at least half as fast as the fastest one, s the way they take to rest.
+        """
+        rng = np.random.default_rng(7)
+        return min(_stop(self.robot, q, qd) for q, qd in self._moments(rng))
+
+    @cached_property
+    def speed(self) -> float:
+        """Of the fastest end of the wire in the nominal motion; 0 where there is none [m/s]."""
+        if self.program is None:
+            return 0.0
+        return max(float(_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
+
+    def _moments(self, rng: np.random.Generator) -> Sequence[tuple[Array, Array]]:
+        """Configurations and joint velocities from which the robot may have to stop."""
+        robot = self.robot
+        if self.program is None:
+            found = []
+            for _ in range(60):
+                qd = rng.normal(size=robot.nq) * robot.max_velocity
+                found.append((robot.home, 0.5 / _speeds(robot, robot.home, qd).max() * qd))
+            return found
+        frame, q, found = robot.tool_frames[0], self.start, []
+        for t in np.arange(0.0, min(self.program.duration, 20.0), 0.1):
+            sample = self.program.sample(float(t))
+            q = joints_for(robot, frame, sample.pose, q)
+            qd = np.linalg.lstsq(robot.jacobian(frame, q), sample.twist, rcond=None)[0]
+            if _speeds(robot, q, qd).max() > 0.1:
+                found.append((q, qd))
+        return found
+
+
+def _speeds(robot: Robot, q: Array, qd: Array) -> Array:
+    """Of the ends of the wire [m/s]."""
+    wire = robot.wire(q, qd)
+    return np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1)
+
+
+def _stop(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
+    """a_s = v²/(2 s) of the slowest stop among the points that move [m/s²]."""
+    speeds = _speeds(robot, q, qd)
+    counted = speeds >= 0.5 * speeds.max()
+    way, v, here = np.zeros_like(speeds), qd.copy(), q.copy()
+    while np.abs(v).max() > 0.0:
+        v = v - np.clip(v, -robot.max_acceleration * dt, robot.max_acceleration * dt)
+        here = here + v * dt
+        way += dt * _speeds(robot, here, v)
+    return float((speeds[counted] ** 2 / (2.0 * way[counted])).min())
+
+
+@cache
+def station(robot: str, motion: str) -> Station:
+    """The station of a robot and a motion, built once a process.
+
+    Args:
+        robot: A bundled name or a path, as for `load_robot`.
+        motion: One of `MOTIONS`, or the path of a program.
+
+    Raises:
+        ConfigurationError: The robot has no spots, or cannot do the motion.
+    """
+    if motion not in MOTIONS and not Path(motion).is_file():
+        raise ConfigurationError("campaign", "motions", motion, f"one of {', '.join(MOTIONS)}, or a program's file")
+    found = Station(motion, load_robot(robot))
+    if found.robot.spots_path is None:
+        raise ConfigurationError("campaign", "robot", robot, "a robot with distance sensors (spots.toml)")
+    found.start  # noqa: B018  a program that the robot cannot follow is refused now
+    return found

@@ -1,0 +1,101 @@
+"""Opponents keep what they promise: stops stand before they are touched, scaling nears nobody faster than v_max."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.closest import closest
+from qpsafe.sim.campaign.opponents import registry
+from qpsafe.sim.campaign.opponents.monitor import Monitor
+from qpsafe.sim.campaign.opponents.registry import names, opponent, register
+from qpsafe.sim.campaign.recording import DT, Recording, record
+from qpsafe.sim.campaign.senses import Senses
+from qpsafe.sim.campaign.station import station
+from qpsafe.sim.engine.bodies import Bodies
+from qpsafe.sim.engine.tracks import PersonTracks
+from qpsafe.sim.experiments.fast_person import at_speed
+
+TICKS = 1100  # somebody who walks at 1.6 m/s is there by then
+
+
+@cache
+def tracks(speed: float) -> PersonTracks:
+    return at_speed(speed).track(DT * np.arange(TICKS))
+
+
+def played(name: str, motion: str, speed: float) -> Recording:
+    place = station("irb140", motion)
+    return record(place, opponent(name), Senses(place, tracks(speed), "ideal", 0), TICKS)
+
+
+@pytest.mark.parametrize("speed", [1.0, 1.6])
+@pytest.mark.parametrize("motion", ["line", "pick"])
+def test_a_stop_with_perfect_sight_stands_whenever_it_is_touched(motion: str, speed: float) -> None:
+    """S_p reckons with people at up to 1.6 m/s: nobody as slow is touched by a robot that moves towards them."""
+    run = played("stop_perfect_sight", motion, speed)
+    near = closest(station("irb140", motion), run.q, tracks(speed))
+    touched = np.flatnonzero(near.distance <= 0.0)
+    assert len(touched) or motion == "pick" or speed < 1.6
+    speeds = near.approach(station("irb140", motion).robot, run.q, run.qd)
+    assert (speeds[touched] < 1e-9).all()
+    assert run.path_time[-1] > 0.5  # it did work
+
+
+def test_scaling_with_perfect_sight_nears_nobody_faster_than_allowed() -> None:
+    """Up to what braking along the path takes, and only while it brakes as hard as it reckons with."""
+    place, speed = station("irb140", "line"), 1.0
+    run = played("scaling_perfect_sight", "line", speed)
+    bodies, limit = Bodies(place.world, place.robot), Monitor(place).separation
+    over = []
+    for k in range(0, TICKS, 4):
+        near = bodies.to_people(place.robot.at(run.q[k]), tracks(speed).row(k), 2.0)
+        over.append(float((near.rows @ run.qd[k] - limit.speed(near.distance)).max(initial=0.0)))
+    assert max(over) < 0.1
+    assert np.mean(np.array(over) > 0.02) < 0.05
+
+
+@pytest.mark.parametrize("name", [*names(), "stop_perfect_sight", "default_perfect_sight"])
+def test_all_keep_the_limits_and_never_refuse_to_move(name: str) -> None:
+    robot = station("irb140", "line").robot
+    run = played(name, "line", 1.6)
+    qdd = np.diff(run.reference_qd, axis=0, prepend=0.0) / DT
+    assert (np.abs(run.reference_qd) <= robot.max_velocity + 1e-9).all()
+    assert (np.abs(qdd) <= robot.max_acceleration * (1.0 + 1e-9) + 1e-9).all()
+    assert (run.reference_q >= robot.lower - 1e-9).all()
+    assert (run.reference_q <= robot.upper + 1e-9).all()
+    assert np.isfinite(run.reference_q).all()
+    assert (run.status <= 1).all()
+    assert run.path_time[-1] > 0.5
+
+
+def test_without_people_all_do_the_same_work() -> None:
+    """Nobody there: nobody stops, whoever watches."""
+    place = station("irb140", "line")
+    nobody = PersonTracks.of((), [()] * 400, DT)
+    runs = {name: record(place, opponent(name), Senses(place, nobody, "ideal", 0), 400) for name in names()}
+    for name, run in runs.items():
+        assert run.path_time[-1] == pytest.approx(runs["none"].path_time[-1], abs=0.11), name  # scaling sets out gently
+        if name in ("stop", "default", "strict", "velocities"):
+            assert np.array_equal(run.q, runs["none"].q), name
+
+
+def test_a_users_controller_takes_part_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_known", dict(registry._known))
+
+    def made(place: Any) -> Any:
+        return place.controller()
+
+    register("mine", made, "as it comes")
+    assert opponent("mine").make is made
+    assert opponent("mine_perfect_sight").sight == "points"
+    for bad in ("mine", "x_perfect_sight", "", "a:b"):
+        with pytest.raises(ConfigurationError, match="controllers"):
+            register(bad, made)
+    found = opponent(f"{__file__}:test_a_users_controller_takes_part_by_name")
+    assert callable(found.make)
+    for wrong in ("nobody", "no.such.module:thing", "math:nothing", "math:pi"):
+        with pytest.raises(ConfigurationError, match="controllers"):
+            opponent(wrong)
