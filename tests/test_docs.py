@@ -115,6 +115,8 @@ def test_commands_and_their_options_exist(page: Path) -> None:
         command = commands()
         for word in words:
             subcommands = getattr(command, "commands", {})
+            if word not in subcommands and (default := getattr(command, "default", "")):  # no command is named
+                command, subcommands = subcommands[default], {}
             if word.startswith("-"):
                 options = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
                 assert word.split("=")[0] in options | {"--help", "-h"}, f"qpsafe {' '.join(words)}: {word}"

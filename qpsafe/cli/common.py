@@ -39,7 +39,19 @@ class ProjectionName(StrEnum):
 
 
 class Group(TyperGroup):
-    """A group whose help shows the whole first paragraph of each command, wrapped."""
+    """A group whose help shows the whole first paragraph of each command, wrapped.
+
+    Attributes:
+        default: The command that is meant where none is named; none by default.
+    """
+
+    default = ""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the default command where none is named."""
+        if self.default and not {*args[:1]} & {*self.commands, *ctx.help_option_names}:
+            args = [self.default, *args]
+        return list(super().parse_args(ctx, args))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write name and first paragraph of every command."""

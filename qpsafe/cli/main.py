@@ -23,6 +23,7 @@ from qpsafe.cli import (
     story,
     stream,
 )
+from qpsafe.cli.campaign.app import app as campaigns
 from qpsafe.cli.common import Group, console
 from qpsafe.cli.demos.app import app as demos
 from qpsafe.errors import QpsafeError
@@ -36,6 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # help is plain text: "[s]" is a unit
 )
 app.add_typer(demos, name="demo")
+app.add_typer(campaigns, name="campaign")
 app.command("compare")(compare.compare)
 app.add_typer(robots.app, name="robots")
 app.command("bench")(bench.bench)

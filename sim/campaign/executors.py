@@ -230,9 +230,11 @@ def dask_executor(address: str) -> Iterator[Executor]:
     """
     try:
         from distributed import Client
+        from distributed.comm import get_address_host
     except ImportError as error:
         raise MissingExtraError(f"--dask needs distributed: pip install distributed ({error})") from error
     try:
+        get_address_host(address)  # a client that has refused its address takes half a minute to be forgotten
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise ConfigurationError(

@@ -1,8 +1,8 @@
 """The worst that can happen under a controller: a search among all encounters that the model of people allows.
 
-An encounter is a point of the unit cube. A quarter of the budget is random; from the worst of that, CMA-ES climbs in the
-coordinates in which an encounter is continuous, those that choose between things kept, one start after the other. As
-many random trials are played beside it, to see what searching is worth.
+An encounter is a point of the unit cube. A quarter of the budget is random; from the worst of that, CMA-ES climbs in
+the coordinates in which an encounter is continuous, those that choose between things kept, one start after the other.
+As many random trials are played beside it, to see what searching is worth.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class Found:
         touched, near = (sum(bool(case.row["contact"]) for case in cases) for cases in (self.searched, self.random))
         text = (
             f"{self.budget:,} searched trials: {len(self.searched):,} nearer than {1e3 * NEAR:.0f} mm, {touched:,} of "
-            f"them contacts; {self.budget:,} random ones: {len(self.random):,} and {near:,}. {len(self.unlike):,} of the "
-            "searched are unlike each other and unlike all random ones."
+            f"them contacts; {self.budget:,} random ones: {len(self.random):,} and {near:,}. {len(self.unlike):,} of "
+            "the searched are unlike each other and unlike all random ones."
         )
         if len(self.unlike) < WANTED:
             text += f" The search could not find {WANTED}."

@@ -17,7 +17,7 @@ from qpsafe.errors import ConfigurationError
 
 APP: Any = typer.main.get_command(main.app)
 #: Paths that are read; every other path of the command line must be one that is written.
-INPUTS = {"story", "program", "people", "cell", "file"}
+INPUTS = {"story", "program", "people", "cell", "file", "folder", "plan"}
 
 
 def path_parameters(app: typer.Typer = main.app, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -49,6 +49,7 @@ ENDINGS = (".json", ".toml", ".csv", ".png", ".mp4")
 def test_the_outputs_are_those_of_all_commands() -> None:
     assert {(words[-1], parameter.name) for words, parameter in OUTPUTS} == {
         *((demo, "out") for demo in ("fixed", "path", "fast-person", "pick-and-place", "place")),
+        *((campaign, "out") for campaign in ("run", "show", "worst", "report")),
         *(("calibrate", name) for name in ("out", "plot")),
         *(
             ("bench", "out"),

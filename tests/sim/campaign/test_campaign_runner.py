@@ -5,12 +5,8 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-import signal
-import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,8 +89,9 @@ def test_dask_gives_the_same(straight: Columns) -> None:
 
 def test_where_no_dask_is_is_named() -> None:
     pytest.importorskip("distributed")
-    with pytest.raises(ConfigurationError, match="--dask = 'nonsense://x'"), dask_executor("nonsense://x"):
-        pass
+    for address in ("nonsense://x", "nonsense", "tcp://127.0.0.1:x"):
+        with pytest.raises(ConfigurationError, match=f"--dask = '{address}'"), dask_executor(address):
+            pass
 
 
 @pytest.mark.parametrize("finished", [set(), {0}, {21}, set(range(22)), {3, 4, 5, 9, 16}])
@@ -147,67 +144,6 @@ def test_a_trial_that_fails_is_named_and_the_others_are_kept(tmp_path: Path) -> 
     assert stored_results(tmp_path).trials == 8
     with pytest.raises(TrialError, match="trial 0: its rows are not one a controller"):
         play_trials(lambda plan, trial: made_up_trials.run(plan, trial)[1:], PLAN, Trials(0, 1))
-
-
-KILLED = """
-import sys
-from pathlib import Path
-import made_up_trials
-from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.runner import run_campaign
-if __name__ == "__main__":
-    plan = Plan(trials=400, seed=3, controllers=("none", "stop", "default"))
-    run_campaign(plan, Path(sys.argv[1]), workers=2, trial=made_up_trials.run_slowly, keep_every=0.1)
-"""
-
-
-def began(folder: Path) -> subprocess.Popen[str]:
-    """A campaign of 400 trials in a Python of its own, which has kept some."""
-    folder.mkdir(exist_ok=True)
-    script = folder.parent / "killed.py"
-    script.write_text(KILLED)
-    environment = os.environ | {"PYTHONPATH": str(Path(made_up_trials.__file__).parent)}
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
-    process = subprocess.Popen([sys.executable, str(script), str(folder)], env=environment, **options)  # type: ignore[call-overload]
-    limit = time.monotonic() + 60
-    while not list(folder.glob("*.parquet")):
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < limit
-        time.sleep(0.02)
-    return process
-
-
-def all_end(group: int) -> None:
-    """Wait until no process of a group is left: they end by themselves."""
-    limit = time.monotonic() + 20
-    with suppress(ProcessLookupError):
-        while True:
-            os.killpg(group, 0)
-            assert time.monotonic() < limit
-            time.sleep(0.05)
-
-
-@pytest.mark.slow
-def test_after_kill_9_it_goes_on_to_the_same_rows_and_no_process_is_left(tmp_path: Path) -> None:
-    process = began(tmp_path / "kept")
-    process.kill()
-    process.communicate()
-    all_end(process.pid)
-    plan = Plan(trials=400, seed=3, controllers=("none", "stop", "default"))
-    before = stored_results(tmp_path / "kept").trials
-    assert 0 < before < 400
-    same(run(plan, tmp_path / "kept").columns, run(plan).columns)
-
-
-@pytest.mark.slow
-def test_the_first_ctrl_c_ends_it_at_once_and_keeps_what_is_finished(tmp_path: Path) -> None:
-    process = began(tmp_path / "kept")
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
-    _, errors = process.communicate(timeout=20)
-    assert errors.count("Traceback") == 1, errors  # the parent's
-    assert "KeyboardInterrupt" in errors
-    all_end(process.pid)
-    assert 0 < stored_results(tmp_path / "kept").trials < 400
 
 
 # The folder

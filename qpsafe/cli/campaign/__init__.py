@@ -1,0 +1,1 @@
+"""`qpsafe campaign`: thousands of paired encounters of a robot with people."""

@@ -1,0 +1,209 @@
+"""`qpsafe campaign` and `qpsafe campaign report`: play trials, judge them, write the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from qpsafe.cli.campaign.options import (
+    WORKERS,
+    Dask,
+    File,
+    Lag,
+    Motions,
+    People,
+    Robot,
+    Seed,
+    Sight,
+    Workers,
+    executor_at,
+    make_plan,
+)
+from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.outputs import output_folder
+from qpsafe.text.json_text import json_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import Console
+
+    from qpsafe.sim.campaign.runner import Results
+
+
+def run(
+    file: File = None,
+    quick: Annotated[bool, typer.Option("--quick", help="100 trials, about a minute; only --out keeps them.")] = False,
+    trials: Annotated[int | None, typer.Option(help="How many; 30,000 by default.")] = None,
+    seed: Seed = None,
+    controllers: Annotated[str | None, typer.Option(help="Names of whom to compare, separated by commas.")] = None,
+    robot: Robot = None,
+    motions: Motions = None,
+    sensor: Sight = None,
+    lag: Lag = None,
+    people: People = None,
+    workers: Workers = WORKERS,
+    dask: Dask = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for trials and report; by default one in out/ that is named after the plan.",
+            callback=output_folder,
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Play a campaign: in every trial the same people meet the robot under every controller, one after the other.
+
+    Trials that are finished are kept in the folder: the same command goes on where it was stopped. Results do not
+    depend on how many processes play them. Exit code 1 if a controller passes a limit, gives a bad command, or is
+    worse for people than no control.
+    """
+    screen = console(json)
+    from qpsafe.sim.campaign.plan import QUICK
+    from qpsafe.sim.campaign.runner import run_campaign
+
+    plan = make_plan(
+        file,
+        trials=QUICK if quick and trials is None else trials,
+        seed=seed,
+        controllers=controllers,
+        robot=robot,
+        motions=motions,
+        sensor=sensor,
+        lag=lag,
+        people=people,
+    )
+    folder = Path("out") / f"campaign-{plan.digest()[:8]}" if out is None and not quick else out
+    with executor_at(dask) as executor, _kept(folder, screen), _counting("trials", screen) as count:
+        results = run_campaign(
+            plan,
+            folder,
+            executor,
+            count,
+            workers=workers,
+            notice=lambda text: screen.print(text, style="yellow"),
+        )
+    _report(results, folder, screen, json)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Of a campaign.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the report; by default the campaign's.", callback=output_folder)
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+) -> None:
+    """Judge and report again what a folder holds, be it finished or not.
+
+    Exit code 1 as by the campaign.
+    """
+    screen = console(json)
+    from qpsafe.sim.campaign.runner import stored_results
+
+    _report(stored_results(folder), out or folder, screen, json)
+
+
+@contextmanager
+def _counting(what: str, screen: Console) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar; what was there at the beginning does not count for the time left."""
+    with progress_bar(screen) as progress:
+        task = progress.add_task(what, total=None)
+
+        def count(done: int, total: int) -> None:
+            if progress.tasks[0].total is None:
+                progress.reset(task, completed=done, total=total)
+            else:
+                progress.update(task, completed=done)
+
+        yield count
+
+
+@contextmanager
+def _kept(folder: Path | None, screen: Console) -> Iterator[None]:
+    """Say how to go on, whatever ended it."""
+    try:
+        yield
+    except BaseException:
+        if folder is None:
+            screen.print("nothing is kept without --out", style="yellow")
+        elif any(folder.glob("trials-*.parquet")):
+            screen.print(f"finished trials are kept in {folder}: the same command goes on there", style="yellow")
+        raise
+
+
+def _report(results: Results, folder: Path | None, screen: Console, json: bool) -> None:
+    """Judge, write, print; exit code 1 if there are faults."""
+    from qpsafe.sim.campaign.report.page import report_page
+    from qpsafe.sim.campaign.report.summary import summary
+
+    with _counting("resampling", screen) as count:
+        found = summary(results, count)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "report.json", json_text(found) + "\n")
+        write_text(folder / "report.html", report_page(results, found))
+    if json:
+        print_json(found)
+    else:
+        show_table(found, screen)
+        if folder is not None:
+            screen.print(f"written to {folder}: report.html, report.json", soft_wrap=True)
+    if found["findings"]:
+        raise typer.Exit(1)
+
+
+def show_table(found: dict[str, Any], screen: Console) -> None:
+    """Print controllers by measures, comparisons with the first reference, and faults."""
+    from qpsafe.cli.sheet import Sheet
+    from qpsafe.sim.campaign.report.measures import FIGURES, SHARES, percent
+
+    shares = [m for m in SHARES if m.name in ("contacts", "moving", "towards", "over_limit", "furniture", "self")]
+    names = ("distance_median", "distance_p10", "energy_p95", "lost_time_mean", "suspensions_mean")
+    figures = [m for m in FIGURES if m.name in names]
+    units = [f"{m.title} [{m.unit}]" if m.unit != "1" else m.title for m in figures]
+    done = found["trials"]["finished"]
+    title = f"{done:,} of {found['trials']['planned']:,} trials, contacts with limits at 95 %"
+    sheet = Sheet(title, ("controller", "contacts", "", *(m.title for m in shares[1:]), *units))
+    for name, controller in found["controllers"].items():
+        low, high = controller["intervals"]["contacts"]
+        sheet.add_row(
+            name,
+            f"{controller['contacts']:,}",
+            f"{percent(low)}-{percent(high)} %",
+            *(f"{controller[m.name]:,}" for m in shares[1:]),
+            *(m.shown(controller[m.name]) for m in figures),
+        )
+    screen.print(sheet)
+    for reference in found["references"][:1]:
+        _show_differences(found, reference, screen)
+    for fault in found["findings"]:
+        screen.print(fault, style="red")
+
+
+def _show_differences(found: dict[str, Any], reference: str, screen: Console) -> None:
+    """Contacts, distance and lost time, less those of a reference."""
+    from qpsafe.cli.sheet import Sheet
+    from qpsafe.sim.campaign.report.measures import FIGURES
+
+    figures = {m.name: m for m in FIGURES}
+    items = {(i["controller"], i["measure"]): i for i in found["comparisons"] if i["reference"] == reference}
+    chosen = [figures[name] for name in ("distance_median", "lost_time_mean")]
+    heads = [text for m in chosen for text in (f"{m.title} [{m.unit}]", "95 %", "p")]
+    title = f"Less {reference}, trial by trial, p corrected for all comparisons"
+    sheet = Sheet(title, ("controller", "contacts more", "fewer", "p", *heads))
+    for name in dict.fromkeys(controller for controller, _ in items):
+        touched = items[name, "contacts"]
+        cells = [f"{touched['only_controller']:,}", f"{touched['only_reference']:,}", f"{touched['p_holm']:.2g}"]
+        for measure in chosen:
+            item = items[name, measure.name]
+            low, high = item["interval"]
+            cells += [measure.shown(item["difference"], True), f"{measure.shown(low)} to {measure.shown(high)}"]
+            cells += [f"{item['p_holm']:.2g}"]
+        sheet.add_row(name, *cells)
+    if sheet.rows:
+        screen.print(sheet)

@@ -1,0 +1,136 @@
+"""The search for the worst case of a controller of a plan, and its cases as files that can be played again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.search import Found, search_worst
+
+
+class Encounter(NamedTuple):
+    """An encounter that is not drawn from a seed.
+
+    Attributes:
+        motion: What the robot does.
+        u: Point of the unit cube of the people's model, (d,).
+    """
+
+    motion: str
+    u: tuple[float, ...]
+
+
+#: Plays an encounter: plan, encounter, controller -> its row. Deterministic, and possible to pickle.
+CaseFunction = Callable[[Plan, Encounter, str], dict[str, Any]]
+
+
+def find_worst(
+    plan: Plan,
+    controller: str,
+    budget: int,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    workers: int = 1,
+    case: CaseFunction | None = None,
+    continuous: NDArray[np.bool_] | None = None,
+) -> Found:
+    """Search among all that the plan's people and motions allow.
+
+    Args:
+        plan: The campaign's; its seed is the search's, too.
+        controller: Whose worst case.
+        budget: Trials for the search, and as many again for the comparison.
+        executor: Any of `concurrent.futures`, or Dask's; None for processes of our own.
+        progress: Called with the trials that are done, and how many there are.
+        workers: Processes, if there is no executor; 1 for none but this one.
+        case: Plays an encounter; by default `qpsafe.sim.campaign.trial.run_case`.
+        continuous: Coordinates of the people's model in which an encounter is continuous, (d,); by default the model's.
+
+    Raises:
+        MissingExtraError: cma is not installed.
+        ConfigurationError: The budget is too small.
+        WorkerDiedError: A process died twice of the same encounter.
+    """
+    free = _continuous(plan) if continuous is None else continuous
+    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
+    play = partial(_play, case or _engine(), plan, controller)
+
+    def evaluate(points: NDArray[np.float64]) -> list[dict[str, Any]]:
+        pieces = [(k, encounter_of(plan, u)) for k, u in enumerate(points.tolist())]
+        return [row for _, row in sorted(answers(crew, play, pieces), key=lambda found: found[0])]
+
+    good = False
+    try:
+        # the first coordinate chooses the motion
+        found = search_worst(evaluate, 1 + len(free), budget, plan.seed, np.append([False], free), progress)
+        good = True
+        return found
+    finally:
+        crew.close(at_once=not good)
+
+
+def encounter_of(plan: Plan, u: Sequence[float]) -> Encounter:
+    """What a point of the search's cube stands for: its first coordinate chooses the motion."""
+    return Encounter(plan.motions[min(int(u[0] * len(plan.motions)), len(plan.motions) - 1)], tuple(u[1:]))
+
+
+def cases_to_dict(plan: Plan, controller: str, found: Found) -> dict[str, Any]:
+    """A search for JSON, its cases as encounters.
+
+    Args:
+        plan: Of the search.
+        controller: Whose worst case.
+        found: What it found.
+    """
+
+    def case(said: dict[str, Any]) -> dict[str, Any]:
+        return {**encounter_of(plan, said["u"])._asdict(), "row": said["row"]}
+
+    table = found.to_dict()
+    table |= {key: case(table[key]) for key in ("worst", "worst_random")}
+    return {"controller": controller, "plan": plan.to_dict()} | table | {"cases": [case(c) for c in table["cases"]]}
+
+
+def load_case(path: Path, number: int) -> Encounter:
+    """A case of a file that `cases_to_dict` made.
+
+    Args:
+        path: The JSON file.
+        number: From 0.
+
+    Raises:
+        ConfigurationError: There is no such file or case.
+    """
+    try:
+        case = json.loads(path.read_text(encoding="utf-8"))["cases"][number]
+        return Encounter(str(case["motion"]), tuple(float(x) for x in case["u"]))
+    except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
+        problem = f"{type(error).__name__}: {error}"
+        raise ConfigurationError(path, f"cases[{number}]", problem, "a case that a search has found") from None
+
+
+def _play(case: CaseFunction, plan: Plan, controller: str, piece: tuple[int, Encounter]) -> tuple[int, dict[str, Any]]:
+    return piece[0], case(plan, piece[1], controller)
+
+
+def _continuous(plan: Plan) -> NDArray[np.bool_]:
+    from qpsafe.sim.campaign.people import EncounterModel  # type: ignore[import-not-found,unused-ignore]
+
+    return np.asarray(EncounterModel.load(plan.people).continuous, dtype=bool)
+
+
+def _engine() -> CaseFunction:
+    from qpsafe.sim.campaign.trial import run_case  # type: ignore[import-not-found,unused-ignore]
+
+    return run_case

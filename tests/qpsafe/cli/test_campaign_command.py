@@ -1,0 +1,336 @@
+"""`qpsafe campaign`: files, JSON, exit codes, clear errors; stopped by whatever, it goes on to the same report."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import made_up_trials
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from qpsafe.cli.campaign.run import _show_differences, show_table
+from qpsafe.cli.main import app
+from qpsafe.cli.sheet import Sheet
+from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
+from qpsafe.sim.campaign.report.page import show_command
+from qpsafe.sim.campaign.runner import run_campaign, stored_results
+from qpsafe.sim.campaign.worst import Encounter, cases_to_dict, encounter_of, find_worst, load_case
+from qpsafe.text.json_text import json_text
+
+FEW = ["--trials", "12", "--workers", "1", "--controllers", "none,stop,default"]
+
+
+@pytest.fixture(autouse=True)
+def _made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Made-up trials in the place of simulated ones, and a current folder of its own."""
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: made_up_trials.run)
+    monkeypatch.chdir(tmp_path)
+
+
+def campaign(*arguments: str) -> Any:
+    return CliRunner().invoke(app, ["campaign", *arguments])
+
+
+# Running
+
+
+def test_a_campaign_is_kept_reported_and_printed(tmp_path: Path) -> None:
+    result = campaign(*FEW, "--out", "kept", "--seed", "4")
+    assert result.exit_code == 0, result.output
+    for word in ("12 of 12 trials", "none", "stop", "default", "Less stop", "report.html"):
+        assert word in " ".join(result.output.split())
+    report = json.loads((tmp_path / "kept" / "report.json").read_text())
+    assert report["seeds"] == [4, 15]
+    assert report["plan"]["controllers"] == ["none", "stop", "default"]
+    assert "<svg" in (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
+    assert stored_results(tmp_path / "kept").trials == 12
+
+
+def test_json_is_one_object_on_standard_output_and_nothing_else(tmp_path: Path) -> None:
+    result = campaign(*FEW, "--quick", "--json")
+    assert result.exit_code == 0, result.output
+    assert list(json.loads(result.stdout)["controllers"]) == ["none", "stop", "default"]
+    assert "trials" in result.stderr  # its progress
+    assert not list(tmp_path.iterdir())  # a quick one is kept only where it is told to
+
+
+def test_a_quick_one_compares_all_and_needs_no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    report = json.loads(campaign("--quick", "--workers", "1", "--json").stdout)
+    assert list(report["controllers"]) == list(CONTROLLERS)
+    assert {found["trials"] for found in report["controllers"].values()} == {QUICK}
+    for options in (["--quick", "--out", "kept"], ["--trials", "5"]):
+        refused = campaign(*options)
+        assert isinstance(refused.exception, MissingExtraError)
+        assert "qpsafe[campaign]" in str(refused.exception)
+
+
+def test_a_folder_is_named_after_the_plan_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    assert campaign(*FEW).exit_code == 0
+    (folder,) = (tmp_path / "out").iterdir()
+    plan = Plan(trials=12, controllers=("none", "stop", "default"))
+    assert folder.name == f"campaign-{plan.digest()[:8]}"
+    files = sorted(file.name for file in folder.iterdir())
+    assert campaign(*FEW).exit_code == 0
+    assert sorted(file.name for file in folder.iterdir()) == files
+    assert campaign(*FEW, "--seed", "1").exit_code == 0
+    assert len(list((tmp_path / "out").iterdir())) == 2
+
+
+def test_a_file_says_the_plan_and_options_go_before_it(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text('trials = 9\nseed = 3\ncontrollers = ["stop", "default"]\nlag = 0.02\n')
+    report = json.loads(campaign("plan.toml", "--seed", "8", "--json", "--workers", "1").stdout)
+    said = report["plan"]
+    assert (said["trials"], said["seed"], said["lag"], said["controllers"]) == (9, 8, 0.02, ["stop", "default"])
+    quick = json.loads(campaign("run", "plan.toml", "--quick", "--json", "--workers", "1").stdout)
+    assert quick["plan"]["trials"] == QUICK
+
+
+def test_a_broken_controller_is_printed_and_the_exit_code_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(plan: Plan, trial: int) -> list[dict[str, Any]]:
+        rows = made_up_trials.run(plan, trial)
+        rows[2] |= {"contact": True, "moving": True, "towards": True, "contact_class": "towards"}
+        return rows
+
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: broken)
+    result = campaign(*FEW, "--trials", "20", "--quick")
+    assert result.exit_code == 1
+    assert "default is worse than no control" in " ".join(result.output.split())
+    assert json.loads(campaign(*FEW, "--trials", "20", "--quick", "--json").stdout)["findings"]
+
+
+def test_a_folder_is_reported_again(tmp_path: Path) -> None:
+    campaign(*FEW, "--out", "kept")
+    pages = [tmp_path / "kept" / name for name in ("report.html", "report.json")]
+    before = [without_times(page.read_text(encoding="utf-8")) for page in pages]
+    for page in pages:
+        page.unlink()
+    assert campaign("report", "kept").exit_code == 0
+    assert [without_times(page.read_text(encoding="utf-8")) for page in pages] == before
+    other = campaign("report", "kept", "--out", "other", "--json")
+    assert json.loads(other.stdout)["trials"] == {"finished": 12, "planned": 12}
+    assert {file.name for file in (tmp_path / "other").iterdir()} == {"report.html", "report.json"}
+
+
+def without_times(text: str) -> str:
+    return re.sub(r'"engine": \{.*?\}|<p class="soft" id="times">.*?</p>', "", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.toml"], "none.toml: file = "),
+        (["--trials", "0"], "--trials = 0"),
+        (["--seed", "-1"], "--seed = -1"),
+        (["--controllers", "stop,brave"], "--controllers = 'brave': expected some of none, stop"),
+        (["--sensor", "radar"], "--sensor = 'radar'"),
+        (["--motions", "hold,dance"], "--motions = 'dance'"),
+        (["--lag", "3"], "--lag = 3.0"),
+        (["--people", "nobody.toml"], "--people = 'nobody.toml'"),
+        (["--dask", "nonsense"], "--dask = 'nonsense'"),
+        (["report", "nowhere"], "manifest.json"),
+        (["show", "first"], "TRIAL = 'first'"),
+        (["show", "worst.json#0"], "worst.json: cases[0]"),
+        (["show", "3", "--controller", "brave"], "--controllers = 'brave'"),
+        (["worst", "brave"], "--controllers = 'brave'"),
+    ],
+)
+def test_what_cannot_be_asked_is_named_and_nothing_is_written(arguments: list[str], said: str, tmp_path: Path) -> None:
+    result = campaign(*arguments)
+    assert result.exit_code != 0
+    assert isinstance(result.exception, ConfigurationError)
+    assert said in str(result.exception)
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(tmp_path: Path) -> None:
+    campaign(*FEW, "--out", "kept")
+    before = {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()}
+    refused = campaign(*FEW, "--out", "kept", "--lag", "0.01")
+    assert isinstance(refused.exception, ConfigurationError)
+    assert "kept: lag = 0.0: expected 0.01" in str(refused.exception)
+    assert {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()} == before
+
+
+# Narrow screens
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_tables_show_every_number_whole(width: int, whole: Callable[[Sheet, int], str]) -> None:
+    from qpsafe.sim.campaign.report.summary import summary
+
+    found = summary(run_campaign(Plan(trials=1000 // width), trial=made_up_trials.run))
+    sheets: list[Any] = []
+    screen = Console(file=io.StringIO(), width=width)
+    screen.print = sheets.append  # type: ignore[method-assign, assignment]
+    show_table(found, screen)
+    assert len(sheets) == 2
+    for sheet in sheets:
+        text = whole(sheet, width)
+        assert all(name in text for name in ("stop_perfect_sight", "nullspace"))
+    _show_differences(found | {"comparisons": []}, "stop", screen)  # nobody to compare with
+    assert len(sheets) == 2
+
+
+# Stopped and killed
+
+SCRIPT = """
+import sys
+import made_up_trials
+from qpsafe.sim.campaign import runner
+runner._engine = lambda: made_up_trials.run_slowly
+runner.KEEP_EVERY = 0.1
+runner.run_campaign.__kwdefaults__["keep_every"] = 0.1
+from qpsafe.cli.main import main
+if __name__ == "__main__":
+    main()
+"""
+LONG = ["campaign", "--trials", "400", "--workers", "2", "--controllers", "none,stop,default", "--out"]
+
+
+def began(folder: Path, until_kept: bool = True) -> subprocess.Popen[str]:
+    """A campaign of 400 trials in a Python of its own, which has kept some."""
+    script = folder.parent / "campaign.py"
+    script.write_text(SCRIPT)
+    environment = os.environ | {"PYTHONPATH": str(Path(made_up_trials.__file__).parent), "NO_COLOR": "1"}
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    command = [sys.executable, str(script), *LONG, str(folder)]
+    process = subprocess.Popen(command, env=environment, **options)  # type: ignore[call-overload]
+    limit = time.monotonic() + 60
+    while until_kept and not list(folder.glob("*.parquet")):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < limit
+        time.sleep(0.02)
+    return process
+
+
+def all_end(group: int) -> None:
+    """Wait until no process of a group is left: they end by themselves."""
+    limit = time.monotonic() + 20
+    with suppress(ProcessLookupError):
+        while True:
+            os.killpg(group, 0)
+            assert time.monotonic() < limit
+            time.sleep(0.05)
+
+
+def reports(folder: Path) -> list[str]:
+    return [without_times((folder / name).read_text(encoding="utf-8")) for name in ("report.json", "report.html")]
+
+
+@pytest.mark.slow
+def test_killed_and_interrupted_it_goes_on_to_the_same_report_byte_for_byte_but_for_times(tmp_path: Path) -> None:
+    folder = tmp_path / "kept"
+    process = began(folder)
+    process.kill()  # signal 9, in the middle
+    process.communicate()
+    all_end(process.pid)
+    first = stored_results(folder).trials
+    assert 0 < first < 400
+    process = began(folder)
+    while stored_results(folder).trials == first:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # Ctrl-C, as a terminal does: to all processes
+    out, errors = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in out + errors
+    assert f"finished trials are kept in {folder}: the same command goes on there" in " ".join(out.split())
+    assert "interrupted" in errors
+    all_end(process.pid)
+    assert first < stored_results(folder).trials < 400
+    process = began(folder, until_kept=False)
+    out, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, out + errors
+    straight = campaign(*LONG[1:3], "--workers", "1", *LONG[5:], "straight")
+    assert straight.exit_code == 0
+    assert reports(folder) == reports(tmp_path / "straight")
+
+
+# One trial again, and the worst
+
+
+def test_show_plays_the_trial_or_the_case_that_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    played: list[tuple[Any, ...]] = []
+
+    class Module:
+        @staticmethod
+        def show(*what: Any) -> dict[str, Any]:
+            played.append(what)
+            (what[3] / "video.mp4").touch()
+            return made_up_trials.row(what[0], 7, what[2], 0.0, False)
+
+    monkeypatch.setitem(sys.modules, "qpsafe.sim.campaign.show", Module)  # type: ignore[arg-type]
+    command = show_command(Plan(seed=9, sensor="sharp"), 7, "stop").split()
+    assert command[:2] == ["qpsafe", "campaign"]
+    result = campaign(*command[2:])
+    assert result.exit_code == 0, result.output
+    assert "video.mp4" in result.output
+    assert "contact_region" in result.output
+    assert "nan" not in result.output
+    (tmp_path / "worst.json").write_text('{"cases": [{}, {"motion": "hold", "u": [0.25, 1]}]}')
+    told = campaign("show", "worst.json#1", "--out", "there", "--json")
+    assert json.loads(told.stdout)["contact"] is True
+    (plan, trial, controller, out), (other, case, name, there) = played
+    assert (plan.seed, plan.sensor, trial, controller, out) == (9, "sharp", 7, "stop", Path("out/campaign-show"))
+    assert (other.seed, case, name, there) == (0, Encounter("hold", (0.25, 1.0)), "default", Path("there"))
+
+
+def play_case(plan: Plan, case: Encounter, controller: str) -> dict[str, Any]:
+    """Contact near a point of the cube, while the robot picks."""
+    gap = float(np.linalg.norm(np.array(case.u) - 0.4)) - 0.2 + (case.motion != "pick")
+    row = made_up_trials.row(plan, 0, controller, 0.0 if gap < 0.0 else 1.0, False)
+    return row | {"motion": case.motion, "distance": gap, "contact": gap <= 0.0, "search": -gap, "closing_speed": 1.0}
+
+
+def test_the_worst_cases_are_found_written_and_can_be_played_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    pytest.importorskip("cma")
+    monkeypatch.setattr("qpsafe.sim.campaign.worst._engine", lambda: play_case)
+    monkeypatch.setattr("qpsafe.sim.campaign.worst._continuous", lambda plan: np.ones(6, dtype=bool))
+    result = campaign("worst", "stop", "--trials", "600", "--workers", "1", "--json", "--out", "found")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found == json.loads((tmp_path / "found" / "worst-stop.json").read_text())
+    assert len(found["cases"]) == found["searched"] >= found["unlike"] >= 10
+    for number, case in enumerate(found["cases"]):
+        again = load_case(tmp_path / "found" / "worst-stop.json", number)
+        assert again.motion == "pick"
+        assert play_case(Plan(), again, "stop")["distance"] == case["row"]["distance"] < 0.05
+    shown = campaign("worst", "stop", "--trials", "600", "--workers", "1", "--seed", "2", "--out", "found")
+    text = " ".join(shown.output.split())
+    assert "qpsafe campaign show found/worst-stop.json#0 --controller stop --seed 2" in text
+    assert "unlike all random ones" in text
+    little = campaign("worst", "stop", "--trials", "40", "--workers", "1", "--motions", "hold")
+    assert little.exit_code == 1
+    assert "could not find 10" in " ".join(little.output.split())
+
+
+def test_the_first_coordinate_chooses_the_motion_and_threads_change_nothing() -> None:
+    pytest.importorskip("cma")
+    from concurrent.futures import ThreadPoolExecutor
+
+    plan = Plan(motions=("hold", "line", "pick"))
+    motions = [encounter_of(plan, (first, 0.5)).motion for first in (0.0, 0.34, 0.67, 1.0)]
+    assert motions == ["hold", "line", "pick", "pick"]
+    options: dict[str, Any] = {"case": play_case, "continuous": np.ones(3, dtype=bool)}
+    alone = find_worst(plan, "stop", 80, **options)
+    with ThreadPoolExecutor(3) as executor:
+        both = [
+            cases_to_dict(plan, "stop", found) for found in (alone, find_worst(plan, "stop", 80, executor, **options))
+        ]
+    assert json_text(both[0]) == json_text(both[1])
