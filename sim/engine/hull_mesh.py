@@ -95,7 +95,8 @@ def _planes(corners: Array, pieces: Array, normals: Array) -> tuple[Array, Index
     heights = (corners @ normals.T).max(axis=0)  # of the hull over each triangle's plane: no more than the triangle's
     if (heights - (pieces * normals[:, None]).sum(axis=2).min(axis=1) > flat).any():
         return np.zeros((0, 4)), np.zeros(len(pieces), dtype=np.int64)
-    owner, planes = np.full(len(pieces), -1, dtype=np.int64), []
+    owner = np.full(len(pieces), -1, dtype=np.int64)
+    planes: list[list[float]] = []
     for i in range(len(pieces)):
         if owner[i] < 0:
             inside = ((pieces @ normals[i]) > heights[i] - flat).all(axis=1) & (normals @ normals[i] > 0.9)

@@ -100,7 +100,7 @@ class World:
         poses = [*scene.robot.at(scene.robot.home).body_poses(), *(_pose(data.xpos[b], data.xmat[b]) for b in loose)]
         geoms = [
             g
-            for g in np.flatnonzero((model.geom_group == SCENERY) | (model.geom_group == ROBOT_COLLISION))
+            for g in np.flatnonzero((model.geom_group == SCENERY) | (model.geom_group == ROBOT_COLLISION)).tolist()
             if movable or owners[model.geom_bodyid[g]] <= scene.robot.nq
         ]
         meshes: list[HullMesh] = []
@@ -141,8 +141,10 @@ class World:
     def take(self, chosen: Sequence[int] | Index) -> World:
         """Some of the shapes, or all in another order; tables of vertices, planes and triangles stay as they are."""
         rows = np.asarray(chosen, dtype=np.int64)
-        kept = {name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES}
-        tables = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
+        kept: dict[str, Any] = {
+            name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES
+        }
+        tables: dict[str, Any] = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
         return replace(self, names=tuple(self.names[i] for i in rows), **tables, **kept)
 
 
@@ -157,7 +159,8 @@ def _owners(scene: Scene) -> tuple[list[int], list[int]]:
     model, robot = scene.model, scene.robot
     number = {f"robot/{name}": i + 1 for i, name in enumerate(robot.joint_names)}
     held = {f"robot/{name}" for name in robot.held}
-    owners, loose = [0], []
+    owners: list[int] = [0]
+    loose: list[int] = []
     for body in range(1, model.nbody):
         first = model.body_jntadr[body]
         names = [model.joint(j).name for j in range(first, first + model.body_jntnum[body])]
