@@ -42,13 +42,14 @@ class World:
     Attributes:
         names: Of the shapes, as in the scene, (g,).
         geoms: Their numbers in the scene, (g,).
-        index: What they are, and where they have their vertices, planes and triangles, (g, 10).
+        index: What they are, and where they have their vertices, planes and boxes, (g, 10).
         shapes: Their poses, sizes and bounds, (g, 26).
         vertices: Of the hulls of all meshes, (v, 3) [m].
         starts: First neighbour of each vertex, (v + 1,).
         neighbours: Vertices at the other ends of a vertex's edges.
-        planes: Around the meshes that are convex, (p, 4).
-        faces: First triangle on each plane, (p + 1,).
+        planes: Of the hulls' faces, (p, 4).
+        boxes: Trees of boxes around the triangles of all meshes, (m, 6) [m], see `HullMesh`.
+        nodes: How the trees hang together, (m, 3).
         triangles: A corner and the two edges from it, (t, 9) [m].
         robot: Which shapes are the robot's, (r,).
         furniture: Which are tables, supports, boxes: all fixed boxes of the scenery but the pedestal's.
@@ -65,7 +66,8 @@ class World:
     starts: Index
     neighbours: Index
     planes: Array
-    faces: Index
+    boxes: Array
+    nodes: Index
     triangles: Array
     robot: Index
     furniture: Index
@@ -75,8 +77,8 @@ class World:
 
     @property
     def seen(self) -> tuple[Index, Array, Array, Index, Array]:
-        """What rays are cast against: index, shapes, planes, faces, triangles."""
-        return self.index, self.shapes, self.planes, self.faces, self.triangles
+        """What rays are cast against: index, shapes, boxes, nodes, triangles."""
+        return self.index, self.shapes, self.boxes, self.nodes, self.triangles
 
     @property
     def solid(self) -> tuple[Index, Array, Array, Index, Index, Array]:
@@ -117,7 +119,7 @@ class World:
             if kind == layout.MESH:
                 meshes.append(_mesh(model, g))
                 points = meshes[-1].vertices
-                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].triangles)]
+                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].boxes)]
                 row[layout.VERTEX :] = np.stack((counts, sizes), axis=1).ravel()
                 counts += sizes
             _measure(numbers, kind, place, model.geom_size[g], points)
@@ -139,7 +141,7 @@ class World:
         )
 
     def take(self, chosen: Sequence[int] | Index) -> World:
-        """Some of the shapes, or all in another order; tables of vertices, planes and triangles stay as they are."""
+        """Some of the shapes, or all in another order; tables of meshes stay as they are."""
         rows = np.asarray(chosen, dtype=np.int64)
         kept: dict[str, Any] = {
             name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES
