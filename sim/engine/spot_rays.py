@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import types
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, row
@@ -238,13 +239,19 @@ class SpotReader:
         self._table, self._seen = table, world.seen
         self._work = np.empty(work_size(world.index))
 
-    def read(self, poses: Array, people: tuple[Array, ...]) -> tuple[Array, Index]:
+    def read(
+        self, poses: Array, people: tuple[Array, ...], reach: ArrayLike | None = None
+    ) -> tuple[Array, NDArray[np.int64]]:
         """Distances read, (k,) [m], and what was met, (k,), as `read_spots` says.
 
         Args:
             poses: Of the world's bodies, (b, 4, 4) [m], see `World`.
             people: A row of `PersonTracks`.
+            reach: Another reach than that of the table, (k,) or one number [m].
         """
-        distances, hits = np.empty(len(self._table.bodies)), np.empty(len(self._table.bodies), dtype=np.int64)
-        read_spots(np.ascontiguousarray(poses), *self._table, *self._seen, *people, self._work, distances, hits)
+        table = self._table
+        if reach is not None:
+            table = table._replace(reaches=np.full(len(table.bodies), reach, dtype=np.float64))
+        distances, hits = np.empty(len(table.bodies)), np.empty(len(table.bodies), dtype=np.int64)
+        read_spots(np.ascontiguousarray(poses), *table, *self._seen, *people, self._work, distances, hits)
         return distances, hits

@@ -16,6 +16,7 @@ from qpsafe.sim.world.robot_spec import ROBOT_COLLISION
 from qpsafe.sim.world.surroundings import SCENERY
 
 if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
     from qpsafe.sim.world.scene import Scene
 
 Array = NDArray[np.float64]
@@ -84,6 +85,20 @@ class World:
     def solid(self) -> tuple[Index, Array, Array, Index, Index, Array]:
         """What distances are measured to: index, shapes, vertices, starts, neighbours, planes."""
         return self.index, self.shapes, self.vertices, self.starts, self.neighbours, self.planes
+
+    def poses(self, state: RobotState, data: Any = None) -> Array:
+        """Poses of the bodies, (b, 4, 4) [m].
+
+        Args:
+            state: The robot.
+            data: State of the scene, of which the poses of `movable` are; not needed if there is none.
+        """
+        poses, n = np.zeros((self.bodies, 4, 4)), self.bodies - len(self.movable)
+        poses[:n] = state.body_poses()
+        if len(self.movable):
+            poses[n:, :3, :3] = data.xmat[self.movable].reshape(-1, 3, 3)
+            poses[n:, :3, 3], poses[n:, 3, 3] = data.xpos[self.movable], 1.0
+        return poses
 
     @classmethod
     def of(cls, scene: Scene, *, movable: bool = False) -> World:
