@@ -9,8 +9,8 @@ from __future__ import annotations
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = 0, 2, 3, 4, 5, 6, 7
 
 #: Columns of `World.index`: kind; body that carries the shape, 0 for the world; the scene's body; whether rays see it;
-#: first vertex and how many; first plane and how many; first triangle and how many.
-KIND, BODY, SCENE_BODY, SEEN, VERTEX, VERTICES, PLANES_FROM, PLANES, TRIANGLES_FROM, TRIANGLES = range(10)
+#: first vertex and how many; first plane and how many; first box of the tree of triangles and how many.
+KIND, BODY, SCENE_BODY, SEEN, VERTEX, VERTICES, PLANES_FROM, PLANES, NODES_FROM, NODES = range(10)
 INTEGERS = 10
 
 #: Columns of `World.shapes`: rows of the pose (3, 4) in the body; sizes as MuJoCo gives them; margin; centre and half

@@ -6,7 +6,7 @@ has one side: it is met from above, within its sizes where it has some.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import copysign, inf, sqrt
 
 from qpsafe.compiled.compiled import Vector, add, dot, inline
 from qpsafe.sim.engine.layout import CAPSULE, CYLINDER, ELLIPSOID, PLANE, SPHERE
@@ -98,15 +98,26 @@ def ray_cylinder(o: Vector, d: Vector, r: float, half: float) -> float:
 
 
 @inline
+def inverse(d: Vector) -> Vector:
+    """1 / d, large where d has no component."""
+    x, y, z = max(abs(d[0]), 1e-30), max(abs(d[1]), 1e-30), max(abs(d[2]), 1e-30)
+    return copysign(1.0 / x, d[0]), copysign(1.0 / y, d[1]), copysign(1.0 / z, d[2])
+
+
+@inline
+def box_span(o: Vector, inv: Vector, a: float, b: float, c: float) -> tuple[float, float]:
+    """Where a line enters and leaves the box of half sizes a, b, c around the origin; the first is larger if never."""
+    near, far = -inf, inf
+    for x, s, half in ((o[0], inv[0], a), (o[1], inv[1], b), (o[2], inv[2], c)):
+        one, other = (-half - x) * s, (half - x) * s
+        near, far = max(near, min(one, other)), min(far, max(one, other))
+    return near, far
+
+
+@inline
 def ray_box(o: Vector, d: Vector, a: float, b: float, c: float) -> float:
     """The box of half sizes a, b, c around the origin."""
-    near, far = -inf, inf
-    for x, v, half in ((o[0], d[0], a), (o[1], d[1], b), (o[2], d[2], c)):
-        if abs(v) > TINY:
-            low, high = (-half - x) / v, (half - x) / v
-            near, far = max(near, min(low, high)), min(far, max(low, high))
-        elif abs(x) > half:
-            return inf
+    near, far = box_span(o, inverse(d), a, b, c)
     return _first(near, far) if near <= far else inf
 
 

@@ -58,48 +58,42 @@ def _out_of(T: Array, p: Vector) -> Vector:
 
 
 @inline
-def _shift(
-    kind: Index, shape: Array, other: Index, others: Array, T: Array, n: Vector,
-    vertices: Array, starts: Index, neighbours: Index,
-) -> float:  # fmt: skip
-    """How far the second core must move along the unit vector n to be parted from the first one."""
-    a, _ = support(kind, shape, n, kind[VERTEX], True, vertices, starts, neighbours)
-    m = _into(T, n)
-    b, _ = support(other, others, (-m[0], -m[1], -m[2]), other[VERTEX], True, vertices, starts, neighbours)
-    return dot(n, a) - dot(n, _out_of(T, b))
-
-
-@inline
 def _depth(
     kind: Index, shape: Array, other: Index, others: Array, T: Array,
     vertices: Array, starts: Index, neighbours: Index, planes: Array, work: Array,
 ) -> float:  # fmt: skip
-    """The shortest of some shifts that part two cores; its direction in work[6:9]."""
-    best = inf
+    """The shortest of some shifts that part two cores; its direction in work[6:9].
+
+    The second core must move along the unit vector n by h = max n·a - min n·b to be parted from the first one.
+    """
+    best, at, there = inf, kind[VERTEX], other[VERTEX]
     c = add(_out_of(T, row(view(others, CASE, (1, 3)), 0)), -1.0, row(view(shape, CASE, (1, 3)), 0))
     length = sqrt(dot(c, c))
     mine = kind[PLANES] if kind[KIND] == MESH else 0
     his = other[PLANES] if other[KIND] == MESH else 0
-    for i in range(7 + mine + his):
-        n = (0.0, 0.0, 1.0) if length == 0.0 else (c[0] / length, c[1] / length, c[2] / length)
-        if 0 < i < 4:
-            n = (1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0, 1.0 if i == 3 else 0.0)
-        elif 4 <= i < 7:
-            n = (T[i - 4], T[i], T[i + 4])
+    for i in range(14 + mine + his):
+        if i < 2:  # the line of centres
+            n = (0.0, 0.0, 1.0) if length == 0.0 else (c[0] / length, c[1] / length, c[2] / length)
+        elif i < 8:  # the axes of both
+            n = (1.0 if i < 4 else 0.0, 1.0 if 4 <= i < 6 else 0.0, 1.0 if i >= 6 else 0.0)
+        elif i < 14:
+            k = (i - 8) // 2
+            n = (T[k], T[4 + k], T[8 + k])
             if dot(n, n) < 0.5:  # the frame of a person's capsule has one axis only
                 continue
-        elif 7 <= i < 7 + mine:
-            n = row(planes, kind[PLANES_FROM] + i - 7)
-        elif i >= 7 + mine:
-            n = row(planes, other[PLANES_FROM] + i - 7 - mine)
-            origin = (T[3], T[7], T[11])
-            n = add(_out_of(T, n), -1.0, origin)
-        for sign in (1.0, -1.0):
-            m = (sign * n[0], sign * n[1], sign * n[2])
-            shift = _shift(kind, shape, other, others, T, m, vertices, starts, neighbours)
-            if shift < best:
-                best = shift
-                work[6], work[7], work[8] = m
+        elif i < 14 + mine:  # the normals of both
+            n = row(planes, kind[PLANES_FROM] + i - 14)
+        else:
+            n = add(_out_of(T, row(planes, other[PLANES_FROM] + i - 14 - mine)), -1.0, (T[3], T[7], T[11]))
+        if (i < 14 and i % 2 == 1) or i >= 14 + mine:
+            n = (-n[0], -n[1], -n[2])
+        a, at = support(kind, shape, n, at, False, vertices, starts, neighbours)
+        m = _into(T, n)
+        b, there = support(other, others, (-m[0], -m[1], -m[2]), there, False, vertices, starts, neighbours)
+        shift = dot(n, a) - dot(n, _out_of(T, b))
+        if shift < best:
+            best = shift
+            work[6], work[7], work[8] = n
     return max(best, 0.0)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import types
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, row
@@ -20,7 +21,7 @@ from qpsafe.robot.kinematics import Index, place
 from qpsafe.sensing import spots
 from qpsafe.sensing.spots import ray_of
 from qpsafe.sim.engine import layout, ray_mesh, ray_shapes
-from qpsafe.sim.engine.layout import BALL, BODY, CASE, KIND, MESH, PLANE, PLANES, SCENE_BODY, SEEN, SIZE
+from qpsafe.sim.engine.layout import BALL, BODY, CASE, KIND, MESH, NODES, NODES_FROM, PLANE, SCENE_BODY, SEEN, SIZE
 from qpsafe.sim.engine.ray_mesh import cone_mesh
 from qpsafe.sim.engine.ray_shapes import ray_box, ray_capsule, ray_primitive
 
@@ -40,7 +41,7 @@ _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for n
 
 def work_size(index: Index) -> int:
     """Numbers that `read_spots` works in, given the `World.index`."""
-    return int(4 * len(index) + 6 * RAYS + 4 * index[:, PLANES].max(initial=0))
+    return 4 * len(index) + 6 * RAYS
 
 
 @inline
@@ -103,8 +104,8 @@ def _faces_plane(o: Vector, a: Vector, sine: float, cosine: float, reach: float,
 
 @inline
 def _look_at(
-    o: Vector, sine: float, cosine: float, best: float, fan: Array, T: Array, kind: Index, shape: Array,
-    planes: Array, faces: Index, triangles: Array, work: Array,
+    o: Vector, sine: float, best: float, fan: Array, T: Array, kind: Index, shape: Array,
+    boxes: Array, nodes: Index, triangles: Array, own: Array,
 ) -> float:  # fmt: skip
     """The nearest point of a shape in a cone, if nearer than `best`."""
     o = _turned(T, shape, add(o, -1.0, place(T, shape[3], shape[7], shape[11])))
@@ -114,13 +115,12 @@ def _look_at(
         a, b, c = shape[CASE + 3] + wide, shape[CASE + 4] + wide, shape[CASE + 5] + wide
         if ray_box(inner, _turned(T, shape, row(fan, 0)), a, b, c) == inf:
             return best
-    own = view(work, 0, (fan.shape[0], 3))
+    own = view(own, 0, (fan.shape[0], 3))
     for i in range(fan.shape[0]):
         own[i, 0], own[i, 1], own[i, 2] = _turned(T, shape, row(fan, i))
     if kind[KIND] == MESH:
-        return cone_mesh(
-            o, own, sine, cosine, best, kind, planes, faces, triangles, view(work, 3 * RAYS, (4 * kind[PLANES],))
-        )
+        first = kind[NODES_FROM]
+        return cone_mesh(o, own, sine, best, first, first + kind[NODES], boxes, nodes, triangles)
     for i in range(fan.shape[0]):
         best = min(best, ray_primitive(kind[KIND], o, row(own, i), shape[SIZE], shape[SIZE + 1], shape[SIZE + 2]))
     return best
@@ -129,7 +129,7 @@ def _look_at(
 @entry(
     types.void(
         _three, _ints, _ints, _three, _one, _one,
-        _rows, _two, _two, _ints, _two,
+        _rows, _two, _two, _rows, _two,
         _three, _one, _two, _three, _two,
         types.float64[::1], types.float64[::1], types.int64[::1],
     ),
@@ -144,8 +144,8 @@ def read_spots(
     slants: Array,
     index: Index,
     shapes: Array,
-    planes: Array,
-    faces: Index,
+    boxes: Array,
+    nodes: Index,
     triangles: Array,
     ends: Array,
     radii: Array,
@@ -161,7 +161,7 @@ def read_spots(
     Args:
         poses: Of the world's bodies, (b, 4, 4): `kinematics.cut(memory, n, ends)[0]`, `RobotState.body_poses()`.
         bodies, unseen, rays, reaches, slants: The spots, see `SpotTable`.
-        index, shapes, planes, faces, triangles: The world, see `World.seen`.
+        index, shapes, boxes, nodes, triangles: The world, see `World.seen`.
         ends, radii, balls, boards, half_sizes: People, see `PersonTracks.row`.
         work: As many numbers as `work_size` tells.
         distances: Filled with the distances read, (k,) [m]: +inf where nothing is in reach, NaN where the spot's ray
@@ -171,7 +171,7 @@ def read_spots(
     """
     count, segments, people = index.shape[0], radii.shape[0], balls.shape[0]
     each = segments // people if people else 0
-    globes, own = view(work, 0, (count, 4)), view(work, 4 * count + 3 * RAYS, (1,))
+    globes, own = view(work, 0, (count, 4)), view(work, 4 * count + 3 * RAYS, (RAYS, 3))
     for g in range(count):
         x, y, z = place(poses[index[g, BODY]], shapes[g, BALL], shapes[g, BALL + 1], shapes[g, BALL + 2])
         globes[g, 0], globes[g, 1], globes[g, 2], globes[g, 3] = x, y, z, shapes[g, BALL + 3]
@@ -197,7 +197,7 @@ def read_spots(
             else:
                 touches = _touches(o, a, sine, cosine, best, row(globes, g), globes[g, 3])
             if touches:
-                t = _look_at(o, sine, cosine, best, fan, T, index[g], shapes[g], planes, faces, triangles, own)
+                t = _look_at(o, sine, best, fan, T, index[g], shapes[g], boxes, nodes, triangles, own)
                 if t < best:
                     best, hits[i] = t, g
         for p in range(people):
@@ -239,13 +239,19 @@ class SpotReader:
         self._table, self._seen = table, world.seen
         self._work = np.empty(work_size(world.index))
 
-    def read(self, poses: Array, people: tuple[Array, ...]) -> tuple[Array, Index]:
+    def read(
+        self, poses: Array, people: tuple[Array, ...], reach: ArrayLike | None = None
+    ) -> tuple[Array, NDArray[np.int64]]:
         """Distances read, (k,) [m], and what was met, (k,), as `read_spots` says.
 
         Args:
             poses: Of the world's bodies, (b, 4, 4) [m], see `World`.
             people: A row of `PersonTracks`.
+            reach: Another reach than that of the table, (k,) or one number [m].
         """
-        distances, hits = np.empty(len(self._table.bodies)), np.empty(len(self._table.bodies), dtype=np.int64)
-        read_spots(np.ascontiguousarray(poses), *self._table, *self._seen, *people, self._work, distances, hits)
+        table = self._table
+        if reach is not None:
+            table = table._replace(reaches=np.full(len(table.bodies), reach, dtype=np.float64))
+        distances, hits = np.empty(len(table.bodies)), np.empty(len(table.bodies), dtype=np.int64)
+        read_spots(np.ascontiguousarray(poses), *table, *self._seen, *people, self._work, distances, hits)
         return distances, hits

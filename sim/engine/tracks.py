@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.people.person import SEGMENTS, Person, PersonPose
+
+if TYPE_CHECKING:
+    from qpsafe.sim.world.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -50,12 +53,7 @@ class PersonTracks:
             object.__setattr__(self, key, own)
         if len(self.names) != s or s % len(SEGMENTS):
             raise ConfigurationError("PersonTracks", "names", self.names, f"one a capsule, {len(SEGMENTS)} a person")
-        parts = self.ends.reshape(ticks, -1, 2 * len(SEGMENTS), 3)
-        centres = 0.5 * (parts.min(axis=2) + parts.max(axis=2))
-        away = np.sqrt(((parts - centres[:, :, None]) ** 2).sum(axis=3)) + np.repeat(
-            self.radii.reshape(1, -1, len(SEGMENTS)), 2, axis=2
-        )
-        object.__setattr__(self, "balls", np.concatenate((centres, away.max(axis=2)[:, :, None]), axis=2))
+        object.__setattr__(self, "balls", _balls(self.ends, self.radii))
         for key in (*shapes, "balls"):
             getattr(self, key).flags.writeable = False
 
@@ -87,6 +85,31 @@ class PersonTracks:
 
     def __len__(self) -> int:
         return len(self.ends)
+
+
+def people_of(scene: Scene, data: Any) -> tuple[Array, Array, Array, Array, Array]:
+    """People and boards as MuJoCo has them now, geom poses up to date: the same as a row of `PersonTracks`."""
+    model, geoms, boards = scene.model, scene.person_geoms, scene.board_geoms
+    radii, halves = model.geom_size[geoms, 0], model.geom_size[geoms, 1]
+    offsets = halves[:, None] * data.geom_xmat[geoms][:, 2::3]  # along the third axis
+    places = data.geom_xpos[geoms]
+    ends = np.stack((places - offsets, places + offsets), axis=1)
+    poses = np.zeros((len(boards), 4, 4))
+    poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = (
+        data.geom_xmat[boards].reshape(-1, 3, 3),
+        data.geom_xpos[boards],
+        1,
+    )
+    return ends, radii, _balls(ends[None], radii)[0], poses, model.geom_size[boards]
+
+
+def _balls(ends: Array, radii: Array) -> Array:
+    """Balls around the capsules of each person, (T, p, 4) [m]."""
+    parts = ends.reshape(len(ends), -1, 2 * len(SEGMENTS), 3)
+    centres = 0.5 * (parts.min(axis=2) + parts.max(axis=2))
+    offsets = parts - centres[:, :, None]
+    away = np.sqrt((offsets * offsets).sum(axis=3)) + radii.repeat(2).reshape(-1, 2 * len(SEGMENTS))
+    return np.concatenate((centres, away.max(axis=2)[:, :, None]), axis=2)
 
 
 def _board(pose: Any) -> Array:

@@ -16,6 +16,7 @@ from qpsafe.sim.world.robot_spec import ROBOT_COLLISION
 from qpsafe.sim.world.surroundings import SCENERY
 
 if TYPE_CHECKING:
+    from qpsafe.robot.state import RobotState
     from qpsafe.sim.world.scene import Scene
 
 Array = NDArray[np.float64]
@@ -42,13 +43,14 @@ class World:
     Attributes:
         names: Of the shapes, as in the scene, (g,).
         geoms: Their numbers in the scene, (g,).
-        index: What they are, and where they have their vertices, planes and triangles, (g, 10).
+        index: What they are, and where they have their vertices, planes and boxes, (g, 10).
         shapes: Their poses, sizes and bounds, (g, 26).
         vertices: Of the hulls of all meshes, (v, 3) [m].
         starts: First neighbour of each vertex, (v + 1,).
         neighbours: Vertices at the other ends of a vertex's edges.
-        planes: Around the meshes that are convex, (p, 4).
-        faces: First triangle on each plane, (p + 1,).
+        planes: Of the hulls' faces, (p, 4).
+        boxes: Trees of boxes around the triangles of all meshes, (m, 6) [m], see `HullMesh`.
+        nodes: How the trees hang together, (m, 3).
         triangles: A corner and the two edges from it, (t, 9) [m].
         robot: Which shapes are the robot's, (r,).
         furniture: Which are tables, supports, boxes: all fixed boxes of the scenery but the pedestal's.
@@ -65,7 +67,8 @@ class World:
     starts: Index
     neighbours: Index
     planes: Array
-    faces: Index
+    boxes: Array
+    nodes: Index
     triangles: Array
     robot: Index
     furniture: Index
@@ -75,13 +78,27 @@ class World:
 
     @property
     def seen(self) -> tuple[Index, Array, Array, Index, Array]:
-        """What rays are cast against: index, shapes, planes, faces, triangles."""
-        return self.index, self.shapes, self.planes, self.faces, self.triangles
+        """What rays are cast against: index, shapes, boxes, nodes, triangles."""
+        return self.index, self.shapes, self.boxes, self.nodes, self.triangles
 
     @property
     def solid(self) -> tuple[Index, Array, Array, Index, Index, Array]:
         """What distances are measured to: index, shapes, vertices, starts, neighbours, planes."""
         return self.index, self.shapes, self.vertices, self.starts, self.neighbours, self.planes
+
+    def poses(self, state: RobotState, data: Any = None) -> Array:
+        """Poses of the bodies, (b, 4, 4) [m].
+
+        Args:
+            state: The robot.
+            data: State of the scene, of which the poses of `movable` are; not needed if there is none.
+        """
+        poses, n = np.zeros((self.bodies, 4, 4)), self.bodies - len(self.movable)
+        poses[:n] = state.body_poses()
+        if len(self.movable):
+            poses[n:, :3, :3] = data.xmat[self.movable].reshape(-1, 3, 3)
+            poses[n:, :3, 3], poses[n:, 3, 3] = data.xpos[self.movable], 1.0
+        return poses
 
     @classmethod
     def of(cls, scene: Scene, *, movable: bool = False) -> World:
@@ -100,7 +117,7 @@ class World:
         poses = [*scene.robot.at(scene.robot.home).body_poses(), *(_pose(data.xpos[b], data.xmat[b]) for b in loose)]
         geoms = [
             g
-            for g in np.flatnonzero((model.geom_group == SCENERY) | (model.geom_group == ROBOT_COLLISION))
+            for g in np.flatnonzero((model.geom_group == SCENERY) | (model.geom_group == ROBOT_COLLISION)).tolist()
             if movable or owners[model.geom_bodyid[g]] <= scene.robot.nq
         ]
         meshes: list[HullMesh] = []
@@ -117,7 +134,7 @@ class World:
             if kind == layout.MESH:
                 meshes.append(_mesh(model, g))
                 points = meshes[-1].vertices
-                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].triangles)]
+                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].boxes)]
                 row[layout.VERTEX :] = np.stack((counts, sizes), axis=1).ravel()
                 counts += sizes
             _measure(numbers, kind, place, model.geom_size[g], points)
@@ -139,10 +156,12 @@ class World:
         )
 
     def take(self, chosen: Sequence[int] | Index) -> World:
-        """Some of the shapes, or all in another order; tables of vertices, planes and triangles stay as they are."""
+        """Some of the shapes, or all in another order; tables of meshes stay as they are."""
         rows = np.asarray(chosen, dtype=np.int64)
-        kept = {name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES}
-        tables = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
+        kept: dict[str, Any] = {
+            name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES
+        }
+        tables: dict[str, Any] = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
         return replace(self, names=tuple(self.names[i] for i in rows), **tables, **kept)
 
 
@@ -157,7 +176,8 @@ def _owners(scene: Scene) -> tuple[list[int], list[int]]:
     model, robot = scene.model, scene.robot
     number = {f"robot/{name}": i + 1 for i, name in enumerate(robot.joint_names)}
     held = {f"robot/{name}" for name in robot.held}
-    owners, loose = [0], []
+    owners: list[int] = [0]
+    loose: list[int] = []
     for body in range(1, model.nbody):
         first = model.body_jntadr[body]
         names = [model.joint(j).name for j in range(first, first + model.body_jntnum[body])]

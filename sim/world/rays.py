@@ -3,9 +3,8 @@
 A spot's own body is left out: it cannot see what it is mounted on. What of the rest does not count is decided by
 the controller's filters, as in the paper, not by the rays.
 
-One `mj_multiRay` call a spot: the rays of its cone start at one point. The poses that the plant and
-`Scene.place_person` have just computed are read; `mujoco.batch.Batch.ray` casts thousands faster, but redoes the
-kinematics of a state handed to it at every call.
+`cast` asks MuJoCo, one `mj_multiRay` call an origin, for rays of any kind; `SpotRays` reads the spots at every tick,
+with the engine's rays. Both read the poses that the plant and `Scene.place_person` have just computed.
 """
 
 from __future__ import annotations
@@ -16,8 +15,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.robot.names import name_in_file
-from qpsafe.sensing.spots import rays_in_world
+from qpsafe.sim.engine.spot_table import SpotTable
+from qpsafe.sim.engine.tracks import people_of
+from qpsafe.sim.engine.world import World
 from qpsafe.sim.world.scene import PERSON, ROBOT_COLLISION, SCENERY, Scene
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 EVERYTHING = (SCENERY, PERSON, ROBOT_COLLISION)  # geometry groups
-RING = 6  # rays on the mantle of a cone, besides its axis
 
 
 def cast(
@@ -81,18 +80,18 @@ def cast(
 class SpotRays:
     """What an ideal distance sensor of the given cone reads at every spot: the nearest surface in the cone.
 
+    The compiled rays of the engine; `cast` is what tests compare them with.
+
     Args:
         scene: The scene.
         spots: The robot's spots.
     """
 
     def __init__(self, scene: Scene, spots: SpotArray) -> None:
-        self._scene, self._spots = scene, spots
-        self._bodies = np.array([_body(scene, frame) for frame in spots.frames], dtype=np.intp)
-        self._mounting = spots.mounting(scene.robot)  # never changes, and takes longer than all that follows from it
-        self._slant = np.tan(0.5 * spots.field_of_view)
-        angle = 2.0 * np.pi * np.arange(RING) / RING
-        self._circle = np.stack((np.cos(angle), np.sin(angle)), axis=1)  # (RING, 2)
+        from qpsafe.sim.engine.spot_rays import SpotReader  # compiled when there are spots to be read
+
+        self._scene, self._world = scene, World.of(scene, movable=True)
+        self._reader = SpotReader(self._world, SpotTable.of(scene, spots))
 
     def distances(self, data: Any, state: RobotState, reach: Array | float | None = None) -> Array:
         """Distance read by every spot (k,) [m], +inf where nothing is within reach.
@@ -102,33 +101,4 @@ class SpotRays:
             state: The robot in the same configuration.
             reach: Farther surfaces are not seen, by default the spots' range [m].
         """
-        origins, axes = rays_in_world(state.body_poses(), *self._mounting)
-        limit = self._spots.range_max if reach is None else reach
-        x, y, z = axes.T
-        zero = np.zeros(len(axes))
-        # u = a × e / |a × e| with e the x axis, or the y axis where a is near x; v = a × u. np.cross takes far longer
-        u = np.where(np.abs(axes[:, :1]) < 0.8, np.stack((zero, z, -y), axis=1), np.stack((-z, zero, x), axis=1))
-        u /= np.sqrt((u * u).sum(axis=1))[:, None]
-        v = np.stack((y * u[:, 2] - z * u[:, 1], z * u[:, 0] - x * u[:, 2], x * u[:, 1] - y * u[:, 0]), axis=1)
-        basis = np.stack((u, v), axis=1)  # (k, 2, 3)
-        mantle = axes[:, None, :] + self._slant[:, None, None] * (self._circle @ basis)
-        rays = np.concatenate((axes[:, None, :], mantle), axis=1)
-        return cast(self._scene, data, origins, rays, limit, bodies=self._bodies).min(axis=1)
-
-
-def _body(scene: Scene, frame: str) -> int:
-    """The MuJoCo body that a frame of the robot, or the joint that moves it, is fixed to; 0 for the world."""
-    model, found = scene.model, scene.robot.model.frames[scene.robot.frame_id(frame)]
-    name, kind = "robot/" + name_in_file(found.name), mujoco.mjtObj
-    owners: list[tuple[Any, Any]] = [
-        (kind.mjOBJ_SITE, model.site_bodyid),
-        (kind.mjOBJ_BODY, np.arange(model.nbody)),
-        (kind.mjOBJ_JOINT, model.jnt_bodyid),
-    ]
-    if found.name != name_in_file(found.name):  # a body, or a joint, whose name a site has too
-        owners = owners[1:] if "(body" in found.name else owners[2:]
-    for what, bodies in owners:
-        index = mujoco.mj_name2id(model, what, name)
-        if index >= 0:
-            return int(bodies[index])
-    return 0
+        return self._reader.read(self._world.poses(state, data), people_of(self._scene, data), reach)[0]

@@ -1,5 +1,6 @@
 """The engine's rays against MuJoCo's, which share no code with them."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -10,7 +11,7 @@ from qpsafe.sim.engine.spot_table import SpotTable
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.pick_place.cell import Cell
-from qpsafe.sim.world.rays import cast
+from qpsafe.sim.world.rays import SpotRays, cast
 from qpsafe.sim.world.scene import build_scene
 
 NOBODY = PersonTracks.of((), [[]], 0.004)
@@ -63,6 +64,25 @@ def test_spots_read_what_mujocos_rays_meet_in_many_configurations(worlds, name):
     print(name, both, one, worst)
     assert one <= 1e-4 * both  # grazes
     assert worst < 1e-9
+
+
+def test_what_can_move_is_seen_where_it_is(worlds):
+    """Screws of the pick-and-place cell, thrown about: by the rays of an experiment, not by those of an encounter."""
+    robot = qpsafe.load_robot("irb140")
+    scene, spots = build_scene(robot, furnish=Cell().furnish), qpsafe.load_spots(robot)
+    rays, fixed, rng = SpotRays(scene, spots), World.of(scene), np.random.default_rng(4)
+    reader, seen = SpotReader(fixed, SpotTable.of(scene, spots)), 0
+    for data, state, tracks in worlds.random_encounters(scene, 60, 4, (0.5, 1.6)):
+        for joint in np.flatnonzero(scene.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
+            at, i = scene.model.jnt_qposadr[joint], rng.integers(len(spots))
+            origin, axis = (side[i] for side in spots.rays(state))
+            data.qpos[at : at + 3] = origin + rng.uniform(0.05, 0.7) * axis
+            data.qpos[at + 3 : at + 7] = rng.normal(size=4)
+        mujoco.mj_kinematics(scene.model, data)
+        expected = by_mujoco(scene, data, state, spots, SpotTable.of(scene, spots))
+        assert rays.distances(data, state) == pytest.approx(expected, abs=1e-9)
+        seen += int((reader.read(fixed.poses(state), tracks.row(0))[0] > expected + 1e-9).sum())
+    assert seen > 100
 
 
 def eyes(rng, count, slant=0.0):

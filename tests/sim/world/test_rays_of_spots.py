@@ -6,6 +6,7 @@ import pytest
 
 import qpsafe
 from qpsafe.sensing.hulls import HullSet
+from qpsafe.sim.engine.spot_table import SpotTable
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.rays import SpotRays, cast
 from qpsafe.sim.world.scene import SCENERY, build_scene
@@ -66,7 +67,7 @@ def test_a_cone_sees_the_nearest_thing_in_it_and_never_less_than_its_axis():
         scene.place_person(data, scene.person.pose(rng.uniform(0.8, 1.3), rng.uniform(-0.5, 0.5), np.pi))
         state = robot.at(q)
         cone = rays.distances(data, state, reach=3.0)
-        axis = cast(scene, data, *spots.rays(state), 3.0, bodies=rays._bodies)
+        axis = cast(scene, data, *spots.rays(state), 3.0, bodies=SpotTable.of(scene, spots).unseen)
         assert (cone <= axis).all()
         nearer += int((cone < axis).sum())
     assert nearer > 50
