@@ -10,8 +10,8 @@ shares of their range, joint velocities as shares of their limits, what the spot
 nothing), the joints' command before, the first tool's error against its reference (m, rad) and the reference's twist.
 The work's clock runs while the tool is within `ON_PATH` of its reference, and stands otherwise.
 
-Reward of a tick: whether work was done, minus `HARM` times what comes nearer than `CAREFUL`, minus `TOUCH` at a contact,
-which ends the episode. The row of measures is in ``info["measures"]`` when an episode is over.
+Reward of a tick: whether work was done, minus `HARM` times what comes nearer than `CAREFUL`, minus `TOUCH` at a
+contact, which ends the episode. The row of measures is in ``info["measures"]`` when an episode is over.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
+from qpsafe.sim.campaign.encounter import encounter
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.recording import DT, Recording, Servo
 from qpsafe.sim.campaign.senses import Senses
-from qpsafe.sim.campaign.trial import encounter
 from qpsafe.tasks.rotation import log3
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.trial import Encounter
+    from qpsafe.sim.campaign.encounter import Encounter
 
 Array = NDArray[np.float64]
 
@@ -106,9 +106,9 @@ class EncounterEnv(gymnasium.Env[Array, Array]):
         self._rows.append((q, qd, self._q, command, phase, self._time, seen))
         self._servo.follow(self._q, command)
         self._k += 1
-        distance = nearest_now(
-            self._met.station, self._servo.q, self._met.tracks, min(self._k, len(self._met.tracks) - 1)
-        )
+        place, tracks = self._met.station, self._met.tracks
+        poses = place.robot.at(self._servo.q).body_poses()
+        distance = place.distances.people(poses, tracks.row(min(self._k, len(tracks) - 1))).distance
         touched, over = distance <= 0.0, self._k >= len(tracks)
         reward = float(working) - HARM * max(1.0 - max(distance, 0.0) / CAREFUL, 0.0) - TOUCH * touched
         info: dict[str, Any] = {"distance": distance}

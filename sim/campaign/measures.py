@@ -17,10 +17,10 @@ from qpsafe.sim.campaign.work import work
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.closest import Closest
+    from qpsafe.sim.campaign.encounter import Encounter
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.recording import Recording
     from qpsafe.sim.campaign.station import Station
-    from qpsafe.sim.campaign.trial import Encounter
 
 Array = NDArray[np.float64]
 

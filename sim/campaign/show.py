@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.closest import closest
+from qpsafe.sim.campaign.encounter import encounter
+from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.recording import DT
-from qpsafe.sim.campaign.trial import encounter, measures, recorded
+from qpsafe.sim.campaign.trial import recorded
 from qpsafe.sim.drawing.film import Film
 from qpsafe.sim.world.scene import build_scene
 
 if TYPE_CHECKING:
+    from qpsafe.sim.campaign.encounter import Encounter
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.recording import Recording
-    from qpsafe.sim.campaign.trial import Encounter
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]

@@ -74,7 +74,7 @@ class Film:
         self._writer = VideoWriter(path, scene, fps=fps)
         self._spots = spots
         self._thresholds = medium_and_high(activation)
-        self._every = max(round(1.0 / (fps * dt)), 1)
+        self.every = max(round(1.0 / (fps * dt)), 1)
 
     def __enter__(self) -> Film:
         self._writer.__enter__()
@@ -93,7 +93,7 @@ class Film:
             scene: What is filmed.
             plant: The state of it.
         """
-        if tick.reference.seq % self._every:
+        if tick.reference.seq % self.every:
             return None
         drawn = overlay(tick, plant, self._spots, self._thresholds)
         caption = Caption(
