@@ -37,7 +37,7 @@ class Touch(NamedTuple):
         distance: [m].
         on_robot, on_person: (3,) [m].
         body: Of the robot, as in its tree.
-        segment: Column of the tracks; a board's number minus the number of boards if it is one.
+        segment: Number of the capsule; from the number of capsules on, that of a board.
     """
 
     k: int
@@ -65,9 +65,9 @@ def described(run: Recording, station: Station, tracks: PersonTracks, before: To
     J = point_jacobian(state, before.body, before.on_robot)
     velocity = J @ run.qd[k]
     towards = float(velocity @ normal)
-    closing = towards - float(tracks.velocity(k, before.segment, before.on_person) @ normal)
+    closing = towards - float(_velocity(tracks, k, before.segment, before.on_person) @ normal)
     clamped = _clamped(station, run.q[k], tracks, before, normal)
-    region = tracks.names[before.segment] if before.segment >= 0 else "board"
+    region = part_name(tracks, before.segment)
     mass = effective_mass(robot, run.q[k], J, normal)
     hit = blow(region, closing, mass, clamped and towards > MOVING)
     speed = float(np.linalg.norm(velocity))
@@ -77,7 +77,7 @@ def described(run: Recording, station: Station, tracks: PersonTracks, before: To
         "contact_time": (k + 1) * run.dt,
         "contact_class": classified(speed, towards, clamped),
         "contact_region": region,
-        "contact_frame": station.world.body_names[before.body],
+        "contact_frame": station.body_name(before.body),
         "moving": speed > MOVING,
         "towards": towards > TOWARDS,
         "clamped": clamped and speed > MOVING,
@@ -91,6 +91,24 @@ def described(run: Recording, station: Station, tracks: PersonTracks, before: To
         "force": hit.force,
         "force_limit": hit.force_limit,
     }
+
+
+def part_name(tracks: PersonTracks, segment: int) -> str:
+    """Region of the body that a capsule belongs to, ``board`` for a board; ``none`` for none."""
+    return "none" if segment < 0 else tracks.names[segment] if segment < len(tracks.names) else "board"
+
+
+def _velocity(tracks: PersonTracks, k: int, segment: int, point: Array) -> Array:
+    """Of the point of a capsule, or a board, that is at `point` at tick k, by its place one tick later (3,) [m/s]."""
+    after, board = min(k + 1, len(tracks) - 1), segment - len(tracks.radii)
+    if board >= 0:
+        here, there = tracks.boards[k, board], tracks.boards[after, board]
+        moved = there @ np.linalg.inv(here) @ np.append(point, 1.0)
+        return np.asarray((moved[:3] - point) / tracks.dt)
+    (a, b), (c, d) = tracks.ends[k, segment], tracks.ends[after, segment]
+    axis = b - a
+    share = min(max(float((point - a) @ axis) / max(float(axis @ axis), 1e-12), 0.0), 1.0)
+    return np.asarray(((1.0 - share) * (c - a) + share * (d - b)) / tracks.dt)
 
 
 def classified(speed: float, towards: float, clamped: bool) -> str:
@@ -126,10 +144,11 @@ def point_jacobian(state: Any, body: int, point: Array) -> Array:
 
 def _clamped(station: Station, q: Array, tracks: PersonTracks, before: Touch, normal: Array) -> bool:
     """Whether scenery, or the robot itself, is right behind the touched part."""
-    if before.segment >= 0:
+    board = before.segment - len(tracks.radii)
+    if board < 0:
         thickness = 2.0 * float(tracks.radii[before.segment])
     else:
-        thickness = 2.0 * float(tracks.half_sizes[before.segment].min())
+        thickness = 2.0 * float(tracks.half_sizes[board].min())
     data = station.scene.make_data(q)
     reach = thickness + ROOM
     start = before.on_person + 1e-6 * normal

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
-from qpsafe.sim.campaign.encounter import encounter
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.recording import DT, Recording, Servo
@@ -32,7 +31,7 @@ from qpsafe.sim.campaign.senses import Senses
 from qpsafe.tasks.rotation import log3
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.encounter import Encounter
+    from qpsafe.sim.campaign.meeting import Meeting
 
 Array = NDArray[np.float64]
 
@@ -70,7 +69,7 @@ class EncounterEnv(gymnasium.Env[Array, Array]):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float64)
 
     def _begin(self, seed: int) -> None:
-        self._met: Encounter = encounter(self._plan, seed)
+        self._met: Meeting = meeting(self._plan, seed)
         place = self._met.station
         self._n = place.robot.nq
         self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)

@@ -17,7 +17,7 @@ from qpsafe.sim.campaign.work import work
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.closest import Closest
-    from qpsafe.sim.campaign.encounter import Encounter
+    from qpsafe.sim.campaign.meeting import Meeting
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.recording import Recording
     from qpsafe.sim.campaign.station import Station
@@ -29,7 +29,7 @@ FAR = 1.0  # what is farther away than this has no figure of its own [m]
 EMPTY: dict[str, Any] = {c.name: {int: 0, float: math.nan, bool: False, str: "none"}[c.kind] for c in COLUMNS}
 
 
-def measures(plan: Plan, met: Encounter, name: str, run: Recording) -> dict[str, Any]:
+def measures(plan: Plan, met: Meeting, name: str, run: Recording) -> dict[str, Any]:
     """The row of a run; its names are explained in `qpsafe.sim.campaign.rows`.
 
     Args:

@@ -7,21 +7,22 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.closest import closest
-from qpsafe.sim.campaign.encounter import encounter
+from qpsafe.sim.campaign.contact import part_name
 from qpsafe.sim.campaign.measures import measures
+from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.recording import DT
 from qpsafe.sim.campaign.trial import recorded
 from qpsafe.sim.drawing.film import Film
 from qpsafe.sim.world.scene import build_scene
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.encounter import Encounter
+    from qpsafe.sim.campaign.meeting import Case, Meeting
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.recording import Recording
     from qpsafe.tick import Tick
@@ -29,61 +30,43 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Shown(NamedTuple):
-    """A trial that was played again.
-
-    Attributes:
-        row: Its measures, as in the campaign.
-        table: The CSV file.
-        video: The mp4, None without one.
-    """
-
-    row: dict[str, Any]
-    table: Path
-    video: Path | None
-
-
 def show(
-    plan: Plan, trial: int, controller: str, out: Path, *,
-    video: bool = True, u: Array | None = None, progress: Callable[[float], None] | None = None,
-) -> Shown:  # fmt: skip
-    """Play a trial again; its row has every bit that it had in the campaign.
+    plan: Plan, what: int | Case, controller: str, out: Path, *,
+    video: bool = True, progress: Callable[[float], None] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Play a trial again: a table of its ticks, a video, and its row with every bit that it had in the campaign.
 
     Args:
         plan: The campaign.
-        trial: Number from 0.
+        what: Number of a trial from 0, or a case that the search for the worst has found.
         controller: Name of one.
         out: Folder of the files, which is made if need be.
         video: Whether to draw.
-        u: Point of the people's cube instead of the trial's own, e.g. one that the search for the worst has found.
         progress: Told the share that is done.
 
     Raises:
         MissingExtraError: A video without the extra "video".
     """
-    met = encounter(plan, trial, u)
-    ticks = len(met.tracks)
+    met = meeting(plan, what)
     out.mkdir(parents=True, exist_ok=True)
-    name = f"trial-{trial}-{controller.replace(':', '-').replace('/', '-')}"
+    place = f"trial-{what}" if isinstance(what, int) else "case"
+    name = f"{place}-{controller.replace(':', '-').replace('/', '-')}"
     answers: list[tuple[float, float, float, str]] = []
 
     def note(k: int, q: Array, tick: Tick) -> None:
         answers.append((tick.cdf_n, tick.m, tick.f, tick.regime))
         if progress is not None:
-            progress((k + 1) / ticks)
+            progress((k + 1) / len(met.tracks))
 
-    movie = None
     if video:
-        movie = out / f"{name}.mp4"
-        run = _filmed(plan, met, controller, movie, note)
+        run = _filmed(plan, met, controller, out / f"{name}.mp4", note)
     else:
         run = recorded(plan, met, controller, note)
-    table = out / f"{name}.csv"
-    _write_table(table, met, run, answers)
-    return Shown(measures(plan, met, controller, run), table, movie)
+    _write_table(out / f"{name}.csv", met, run, answers)
+    return measures(plan, met, controller, run)
 
 
-def _filmed(plan: Plan, met: Encounter, controller: str, path: Path, note: Callable[..., None]) -> Recording:
+def _filmed(plan: Plan, met: Meeting, controller: str, path: Path, note: Callable[..., None]) -> Recording:
     """Play it before the camera."""
     place, story = met.station, met.story
     furnish = None if place.cell is None else place.cell.furnish
@@ -102,7 +85,7 @@ def _filmed(plan: Plan, met: Encounter, controller: str, path: Path, note: Calla
         return recorded(plan, met, controller, observe)
 
 
-def _write_table(path: Path, met: Encounter, run: Recording, answers: list[tuple[float, float, float, str]]) -> None:
+def _write_table(path: Path, met: Meeting, run: Recording, answers: list[tuple[float, float, float, str]]) -> None:
     """Every tick as a row, the file whole or not at all."""
     near = closest(met.station, run.q, met.tracks)
     joints = met.station.robot.joint_names
@@ -116,9 +99,9 @@ def _write_table(path: Path, met: Encounter, run: Recording, answers: list[tuple
             for k, (cdf_n, m, f, regime) in enumerate(answers):
                 figures = (f"{value:.9g}" for value in (*run.q[k], *run.qd[k]))
                 writer.writerow(
-                    [f"{k * run.dt:.3f}", f"{near.distance[k]:.6f}", met.station.world.body_name(near.body[k]),
-                     met.tracks.part(near.segment[k]), len(run.points[k]), f"{cdf_n:.6g}", f"{m:.6g}", f"{f:.6g}",
-                     regime, run.phase[k], run.status[k], f"{run.path_time[k]:.6f}", *figures]
+                    [f"{k * run.dt:.3f}", f"{near.distance[k]:.6f}", met.station.body_name(int(near.body[k])),
+                     part_name(met.tracks, int(near.segment[k])), len(run.points[k]), f"{cdf_n:.6g}", f"{m:.6g}",
+                     f"{f:.6g}", regime, run.phase[k], run.status[k], f"{run.path_time[k]:.6f}", *figures]
                 )  # fmt: skip
         os.replace(part, path)
     finally:

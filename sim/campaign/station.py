@@ -114,6 +114,10 @@ class Station:
             return self.robot.home
         return joints_for(self.robot, self.robot.tool_frames[0], self.program.sample(0.0).pose, self.robot.home)
 
+    def body_name(self, body: int) -> str:
+        """Of the robot's tree: the joint that moves it, ``base`` for 0."""
+        return "base" if body == 0 else self.robot.joint_names[body - 1]
+
     def tasks(self, trajectory: Trajectory | None = None) -> list[Task]:
         """Where all tools are, over how they are turned; the first one follows its reference, or another one.
 

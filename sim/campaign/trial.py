@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from qpsafe.sim.campaign.encounter import Encounter, encounter
 from qpsafe.sim.campaign.measures import measures
+from qpsafe.sim.campaign.meeting import Case, Meeting, meeting
 from qpsafe.sim.campaign.opponents.registry import opponent
 from qpsafe.sim.campaign.recording import Observer, Recording, record
 from qpsafe.sim.campaign.senses import Senses
@@ -24,11 +24,23 @@ def run_trial(plan: Plan, trial: int) -> list[dict[str, Any]]:
         plan: The campaign.
         trial: Number from 0.
     """
-    met = encounter(plan, trial)
+    met = meeting(plan, trial)
     return [measures(plan, met, name, recorded(plan, met, name)) for name in plan.controllers]
 
 
-def recorded(plan: Plan, met: Encounter, name: str, observer: Observer | None = None) -> Recording:
+def run_case(plan: Plan, case: Case, controller: str) -> dict[str, Any]:
+    """The row of one controller in an encounter that is not drawn from a seed.
+
+    Args:
+        plan: The campaign.
+        case: Motion and point of the people's cube.
+        controller: Its name.
+    """
+    met = meeting(plan, case)
+    return measures(plan, met, controller, recorded(plan, met, controller))
+
+
+def recorded(plan: Plan, met: Meeting, name: str, observer: Observer | None = None) -> Recording:
     """The run of one controller in an encounter.
 
     Args:
