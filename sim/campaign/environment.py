@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
 from qpsafe.sim.campaign.measures import measures
+from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.recording import DT, Recording, Servo
 from qpsafe.sim.campaign.senses import Senses

@@ -13,7 +13,7 @@ from qpsafe.sim.campaign.closest import closest, smallest
 from qpsafe.sim.campaign.contact import TOWARDS, Touch, described
 from qpsafe.sim.campaign.opponents.registry import NOTHING, POINTS, opponent
 from qpsafe.sim.campaign.rows import COLUMNS
-from qpsafe.sim.campaign.work import work
+from qpsafe.sim.campaign.work import STANDS, work
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.closest import Closest
@@ -74,10 +74,12 @@ def _sight(run: Recording, place: Station, near: Closest) -> dict[str, Any]:
     """First sight, and the protective separation distance S_p of each tick's approach."""
     separation = Separation(place.deceleration)
     needed = separation.distance(near.approach(place.robot, run.q, run.qd))
-    under = near.distance < needed
+    moving = np.abs(run.qd).max(axis=1) > STANDS
+    under = (near.distance < needed) & moving
     seen = np.array([len(points) > 0 for points in run.points])
     first = int(seen.argmax()) if seen.any() else len(seen)
-    too_near = int(under.argmax()) if under.any() else len(seen)
+    nearer = near.distance < needed
+    too_near = int(nearer.argmax()) if nearer.any() else len(seen)
     found: dict[str, Any] = {"under_sp": run.dt * int(under.sum()), "sight_in_time": first <= too_near}
     if first < len(seen):
         found |= {"first_sight": run.dt * first, "first_sight_distance": float(near.distance[first])}

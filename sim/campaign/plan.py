@@ -44,7 +44,7 @@ class Plan:
         motions: Some of `MOTIONS`, or paths of programs (TOML); trials take turns with them.
         controllers: Names of what is compared.
         sensor: One of `SENSORS`, what all controllers see by that do not say otherwise.
-        lag: Of the servos, first order [s]; 0: they follow perfectly.
+        lag: Delay of the servos, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
         trials: How many.
         seed: Of the first trial; that of trial k is seed + k.
@@ -80,10 +80,8 @@ class Plan:
             raise ConfigurationError(
                 "Plan", "people", self.people, "a TOML file, or a folder of stories, that is there"
             )
-        known = known_controllers()
         for name in self.controllers:
-            if name not in known:
-                raise ConfigurationError("Plan", "controllers", name, "some of " + ", ".join(known))
+            _check_controller(name)
 
     def seed_of(self, trial: int) -> int:
         """Of everything random in a trial."""
@@ -166,13 +164,13 @@ def parse_plan(text: TomlText, folder: Path = Path()) -> Plan:
         raise text.wrong([wrong.key], wrong.value, wrong.expected) from None
 
 
-def known_controllers() -> tuple[str, ...]:
-    """Names that can be compared: of the registry, with a user's own."""
+def _check_controller(name: str) -> None:
+    from qpsafe.sim.campaign.opponents import opponent
+
     try:
-        from qpsafe.sim.campaign.opponents import names  # type: ignore[import-not-found,unused-ignore]
-    except ModuleNotFoundError:  # until the registry is there
-        return CONTROLLERS
-    return names()
+        opponent(name)
+    except ConfigurationError as wrong:
+        raise ConfigurationError("Plan", "controllers", name, wrong.expected) from None
 
 
 @cache

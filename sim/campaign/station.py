@@ -142,6 +142,30 @@ class Station:
         given = {"known": self.known, "activation": robot_activation(self.robot, count, count), **parts}
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
+    def nominal(self, ticks: int) -> float:
+        """Time on the path that is done after so many ticks where nobody comes [s]: less than theirs where events wait.
+
+        Args:
+            ticks: Of `dt`.
+        """
+        while len(self._alone) < ticks:
+            self._go_on_alone()
+        return self._alone[ticks - 1]
+
+    @cached_property
+    def _alone(self) -> list[float]:
+        return []
+
+    @cached_property
+    def _loner(self) -> list[Any]:
+        return [self.controller(), self.start, np.zeros(self.robot.nq)]
+
+    def _go_on_alone(self) -> None:
+        controller, q, qd = self._loner
+        tick = controller.step(q, qd, points=np.empty((0, 3)))
+        self._loner[1:] = tick.reference.q, tick.reference.qd
+        self._alone.append(tick.path_time)
+
     @cached_property
     def deceleration(self) -> float:
         """a_s: the smallest deceleration of a stop from the motion, or from 0.5 m/s where there is none [m/s²].

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import Case, Meeting, meeting
-from qpsafe.sim.campaign.opponents.registry import opponent
+from qpsafe.sim.campaign.opponents.registry import POINTS, SPOTS, opponent
 from qpsafe.sim.campaign.recording import Observer, Recording, record
 from qpsafe.sim.campaign.senses import Senses
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.plan import Plan
+
+PERFECT_SIGHT = "perfect"  # the plan's sensor that tells everybody where people are
 
 
 def run_trial(plan: Plan, trial: int) -> list[dict[str, Any]]:
@@ -49,5 +51,7 @@ def recorded(plan: Plan, met: Meeting, name: str, observer: Observer | None = No
         name: Of the controller.
         observer: Called after every tick, see `record`.
     """
-    senses = Senses(met.station, met.tracks, plan.sensor, met.seed)
-    return record(met.station, opponent(name), senses, len(met.tracks), plan.lag, observer)
+    entry, senses = opponent(name), Senses(met.station, met.tracks, plan.sensor, met.seed)
+    if plan.sensor == PERFECT_SIGHT and entry.sight == SPOTS:
+        entry = entry._replace(sight=POINTS)
+    return record(met.station, entry, senses, len(met.tracks), plan.lag, observer)

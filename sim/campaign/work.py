@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TURNS = 0.02  # joint speed on both sides of zero that makes a change of direction a reversal [rad/s]
-STANDS = 1e-3  # a robot whose joints are all slower stands [rad/s]
+STANDS = 1e-3  # a robot whose joints are all slower, and whose path waits, is stopped [rad/s]
 EVERY = 5  # ticks between two looks at the path error
 SETTLING = 0.3  # after a return to the path its error still runs out [s]
 
@@ -42,21 +42,23 @@ def work(run: Recording, station: Station) -> Work:
         run: Of a controller.
         station: Where it was.
     """
-    duration = run.dt * len(run.q)
-    suspended = run.phase == SUSPENDED
-    standing = np.abs(run.qd).max(axis=1) < STANDS
-    begun = np.flatnonzero(np.diff(standing.astype(np.int8)) == 1)
-    moved = run.path_time[-1] / duration
+    nominal, done = station.nominal(len(run.q)), float(run.path_time[-1])
+    standing = (np.abs(run.qd).max(axis=1) < STANDS) & (np.diff(run.path_time, prepend=0.0) == 0.0)
     return Work(
-        progress=float(moved),
-        lost_time=float(duration - run.path_time[-1]),
-        stops=len(begun) if station.program is not None else 0,
-        suspensions=int((np.diff(suspended.astype(np.int8), prepend=0) == 1).sum()),
+        progress=done / nominal,
+        lost_time=nominal - done,
+        stops=_begun(standing) if station.program is not None else 0,
+        suspensions=_begun(run.phase == SUSPENDED),
         path_error=_path_error(run, station),
         reversals=_reversals(run.qd),
         limit_excess=_excess(run, station.robot),
         bad_ticks=int((run.status > 1).sum()),
     )
+
+
+def _begun(during: NDArray[np.bool_]) -> int:
+    """How often something began."""
+    return int((np.diff(during.astype(np.int8), prepend=0) == 1).sum())
 
 
 def _reversals(qd: Array) -> int:

@@ -44,6 +44,8 @@ class Monitor:
         self.robot = station.robot
         self._bodies = Bodies(station.world, station.robot)
         self._sensing = station.controller().sensing
+        #: Points seen at the last tick (p, 3) [m].
+        self.seen = np.empty((0, 3))
 
     def gaps(self, q: Array, qd: Array, distances: ArrayLike | None, points: ArrayLike | None) -> Gaps | None:
         """What is near; None where too many sensors cannot be trusted.
@@ -64,5 +66,6 @@ class Monitor:
             if found.too_many:
                 return None
             seen = found.points
+        self.seen = seen
         near = self._bodies.to_points(state, seen, FAR)
         return Gaps(near.distance, near.rows)

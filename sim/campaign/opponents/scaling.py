@@ -84,7 +84,7 @@ class PathScaling:
         tick = self._controller.step(q, qd, points=_NOBODY)
         clock.time += clock.rate * self._dt
         phase = FOLLOWING if clock.rate > 0.0 else SUSPENDED
-        return replace(tick, path_time=clock.time, phase=phase)
+        return replace(tick, path_time=clock.time, phase=phase, points=self._monitor.seen)
 
 
 _NOBODY = np.empty((0, 3))

@@ -59,7 +59,7 @@ class StopOnly:
         else:
             free = bool((gaps.rows @ self._tick.reference.qd <= self._monitor.separation.speed(gaps.distances)).all())
         if not self._stopping and free:
-            self._tick = self._controller.step(q, qd, points=_NOBODY)
+            self._tick = replace(self._controller.step(q, qd, points=_NOBODY), points=self._monitor.seen)
             return self._tick
         assert self._tick is not None
         self._stopping = True
@@ -68,7 +68,7 @@ class StopOnly:
         reference = JointReference(
             last.seq + 1, last.time + self._dt, last.q + command * self._dt, command, last.active
         )
-        self._tick = replace(self._tick, reference=reference, phase=SUSPENDED, events=(), points=_NOBODY)
+        self._tick = replace(self._tick, reference=reference, phase=SUSPENDED, events=(), points=self._monitor.seen)
         at_rest = not command.any()
         if at_rest and gaps is not None and (gaps.distances >= self._again).all():
             self._controller.reseed()  # back to the path, whose clock stood still

@@ -51,7 +51,7 @@ def test_a_file_says_a_plan_and_its_paths_are_relative_to_it(tmp_path: Path) -> 
         ('motions = ["none.toml"]', "motions = 'none.toml'"),
         ("motions = []", "motions = "),
         ('controllers = ["stop", "stop"]', "twice"),
-        ('controllers = ["brave"]', "controllers = 'brave': expected some of none, stop"),
+        ('controllers = ["brave"]', "controllers = 'brave': expected one of none, stop"),
         ('people = "nobody.toml"', "people = 'nobody.toml'"),
         ("speed = 3", "speed = 3"),
         ("robot = 140", "robot = 140"),
