@@ -16,7 +16,7 @@ contact, which ends the episode. The row of measures is in ``info["measures"]`` 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -52,7 +52,7 @@ class EncounterEnv(gymnasium.Env[Array, Array]):
         people: A TOML file with a model of people, None for the bundled one.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012  gymnasium's own form
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(
         self, robot: str = "irb140", motion: str = "hold", sensor: str = "ideal", lag: float = 0.0,

@@ -122,4 +122,4 @@ def record(
         if observer is not None:
             observer(k, q, tick)
         servo.follow(reference.q, reference.qd)
-    return Recording(DT, *run, np.array(phases), path_time, status, points)
+    return Recording(DT, run[0], run[1], run[2], run[3], np.array(phases), path_time, status, points)

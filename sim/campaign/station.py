@@ -189,14 +189,14 @@ class Station:
         if self.program is None:
             found = []
             for _ in range(60):
-                qd = rng.normal(size=robot.nq) * robot.max_velocity
-                found.append((robot.home, 0.5 / _speeds(robot, robot.home, qd).max() * qd))
+                wild = rng.normal(size=robot.nq) * robot.max_velocity
+                found.append((robot.home, 0.5 / _speeds(robot, robot.home, wild).max() * wild))
             return found
         frame, q, found = robot.tool_frames[0], self.start, []
         for t in np.arange(0.0, min(self.program.duration, 20.0), 0.1):
             sample = self.program.sample(float(t))
             q = joints_for(robot, frame, sample.pose, q)
-            qd = np.linalg.lstsq(robot.jacobian(frame, q), sample.twist, rcond=None)[0]
+            qd: Array = np.linalg.lstsq(robot.jacobian(frame, q), sample.twist, rcond=None)[0]
             if _speeds(robot, q, qd).max() > 0.1:
                 found.append((q, qd))
         return found

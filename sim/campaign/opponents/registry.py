@@ -36,7 +36,14 @@ class Controls(Protocol):
     """What a trial needs of a controller: `SafetyController.step`'s form."""
 
     def step(self, q: NDArray, qd: NDArray, distances: ArrayLike | None = None, *, points: Any = None) -> Tick:
-        """One tick; never raises on data."""
+        """One tick; never raises on data.
+
+        Args:
+            q: Measured (n,) [rad].
+            qd: Measured (n,) [rad/s].
+            distances: Of the spots (k,) [m].
+            points: Instead (p, 3) [m].
+        """
         ...
 
 
