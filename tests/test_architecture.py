@@ -36,6 +36,7 @@ sim.experiments.path
 sim.experiments.pick_place
 sim.replay
 sim.experiments sim.sick sim.placement
+sim.campaign
 sim.irc5
 cli.common cli.sheet cli.outputs
 cli cli.demos

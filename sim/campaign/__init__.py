@@ -1,0 +1,1 @@
+"""The proof: thousands of paired encounters of a robot with people."""
