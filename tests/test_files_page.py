@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
+from qpsafe.sim.campaign.people_tables import PeopleTable
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile
 
@@ -23,6 +24,7 @@ ROOTS: dict[str, type[BaseModel]] = {
     "Program": ProgramFile,
     "Cell": cell_file._Cell,
     "Story": StoryTable,
+    "People": PeopleTable,
     "Spots": SpotFile,
     "Robot": RobotFile,
     "Calibration": calibration._File,

@@ -21,7 +21,16 @@ from numpy.typing import NDArray
 from qpsafe.sim.people.anatomy import FIRST, LEG_USED, SEGMENTS, Body, Segment
 from qpsafe.sim.people.limbs import bend_trunk, roll_foot, two_link
 from qpsafe.sim.people.poses import PersonPose, PersonPoses
-from qpsafe.sim.people.posture import FINGERS, Point, Posture, Postures, Stoop, least_stoop, place_hands
+from qpsafe.sim.people.posture import (
+    FINGERS,
+    Point,
+    Posture,
+    Postures,
+    Stoop,
+    least_stoop,
+    place_hands,
+    place_shoulders,
+)
 
 __all__ = ["SEGMENTS", "Board", "Foot", "Person", "PersonPose", "PersonPoses", "Segment"]
 
@@ -192,6 +201,11 @@ class Person:
         at = self._nominal if hold is None else np.array([hold])
         hip = self.body.ankle + LEG_USED * (self.body.thigh + self.body.shank)
         return least_stoop(self.body, hip, goals, self._edges(at)[0])
+
+    def shoulders(self, stoop: Stoop) -> Array:
+        """Left and right shoulder of somebody who stands and stoops so (2, 3), root's frame [m]."""
+        hip = self.body.ankle + LEG_USED * (self.body.thigh + self.body.shank)
+        return place_shoulders(self.body, hip, *np.array(stoop))
 
     @property
     def _nominal(self) -> Array:

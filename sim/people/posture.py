@@ -136,7 +136,7 @@ def place_hands(body: Body, hip: Array, postures: Postures, swings: Array, edges
         edges: Where the wrists would hold the board (T, 2, 3).
     """
     arms, stoop, side = postures.arms, postures.stoop, np.array([1.0, -1.0])
-    shoulders = _shoulders(body, hip, stoop[:, 0], stoop[:, 1])
+    shoulders = place_shoulders(body, hip, stoop[:, 0], stoop[:, 1])
     angle, out = SWING * swings + 0.06, 0.10
     whole = 0.97 * (body.upper_arm + body.forearm) + body.hand
     flat, wide = whole * math.cos(out), np.broadcast_to(side * whole * math.sin(out), angle.shape)
@@ -152,8 +152,15 @@ def place_hands(body: Body, hip: Array, postures: Postures, swings: Array, edges
     return shoulders, wrists - back, grips - back  # on its way the hand stays with the arm
 
 
-def _shoulders(body: Body, hip: Array | float, lean: Array, crouch: Array) -> Array:
-    """(..., 2, 3)."""
+def place_shoulders(body: Body, hip: Array | float, lean: Array, crouch: Array) -> Array:
+    """Left and right shoulder (..., 2, 3) [m].
+
+    Args:
+        body: Whose.
+        hip: Height of the hips when upright (...) [m].
+        lean: Of the back (...) [rad].
+        crouch: Of the knees (...) [m].
+    """
     x, z = np.broadcast_arrays(body.trunk * np.sin(lean), hip - crouch + body.trunk * np.cos(lean))
     return np.stack([np.stack((x, np.full_like(x, y), z), axis=-1) for y in (body.shoulder, -body.shoulder)], axis=-2)
 
@@ -177,7 +184,7 @@ def least_stoop(body: Body, hip: float, goals: Sequence[Point | str], edges: Arr
     low = min(1.2 * max(0.75 * hip - float(points[:, 2].min()), 0.0), CROUCH * body.scale)  # the lower, the more
 
     def lacking(shares: Array) -> Array:
-        shoulders = _shoulders(body, hip, shares * LEAN, shares * shares * low)[:, wanted]
+        shoulders = place_shoulders(body, hip, shares * LEAN, shares * shares * low)[:, wanted]
         found: Array = (length(points - shoulders)[..., 0] - most).max(axis=-1)
         return found
 

@@ -17,6 +17,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sim.people.paces import eased, ramped
+
 EASE = 0.5, 0.5  # T: at no speed [s], and what each m/s adds to it
 TURNING = math.radians(150.0)  # peak rate of a turn [rad/s]
 SHARP = math.radians(100.0)  # sharper corners are stopped at
@@ -24,20 +26,6 @@ SHARP = math.radians(100.0)  # sharper corners are stopped at
 Array = NDArray[np.float64]
 Root = tuple[float, float, float]  # x [m], y [m], heading [rad]
 Roots = tuple[Array, Array, Array]  # the same at many times
-
-
-def eased(share: Array) -> Array:
-    """From 0 to 1 for shares of time 0 to 1, at rest at both ends; the integral of the kernel. Fastest rate: 2."""
-    share = np.minimum(np.maximum(share, 0.0), 1.0)
-    found: Array = share - np.sin(2.0 * math.pi * share) / (2.0 * math.pi)
-    return found
-
-
-def ramped(times: Array, ease: float) -> Array:
-    """max(time, 0) smoothed by the kernel of width `ease`: the integral of `eased` [s]."""
-    u = np.minimum(np.maximum(times / ease, -0.5), 0.5)
-    bend = ease * (0.5 * u * u + 0.5 * u + 0.125 - (1.0 + np.cos(2.0 * math.pi * u)) / (4.0 * math.pi**2))
-    return np.where(np.abs(times) < 0.5 * ease, bend, np.maximum(times, 0.0))
 
 
 class Piece(Protocol):
@@ -81,6 +69,7 @@ class Walk:
         speed: float,
         turning: bool = True,
         ease: float | None = None,
+        stop: float | None = None,
     ) -> None:
         """Plan it: `start` [s], way-points (x, y) [m], speed [m/s], T [s]; no corner may be sharper than `SHARP`.
 
@@ -91,13 +80,18 @@ class Walk:
             speed: Between the corners.
             turning: Towards travel; else the heading stays.
             ease: T, time of speeding up, of slowing down and of a corner; by default longer the faster.
+            stop: T of slowing down at the end, if that is another one.
         """
         corners = np.array([root[:2], *points])
         legs = np.diff(corners, axis=0)
         lengths = np.hypot(*legs.T)
         self.start, self._root, self.ease = start, root, ease or EASE[0] + EASE[1] * speed
         self._times = start + 0.5 * self.ease + np.concatenate(([0.0], np.cumsum(lengths))) / speed
-        self.end = float(self._times[-1] + 0.5 * self.ease)
+        # the end's smoothing begins and ends after that of the corner before, or the velocity were no average any more
+        apart = 2.0 * float(lengths[-1]) / speed
+        last = min(max(stop or self.ease, self.ease - apart), self.ease + apart)
+        self._eases = np.array([*[self.ease] * len(legs), last])
+        self.end = float(self._times[-1] + 0.5 * last)
         velocities = speed * legs / lengths[:, None]
         self._changes: Array = np.diff(velocities, axis=0, prepend=0.0, append=0.0)
         directions = np.arctan2(legs[:, 1], legs[:, 0])
@@ -115,7 +109,7 @@ class Walk:
         """The root at times (T,)."""
         times = np.asarray(times)
         done, after = times >= self.end, times[..., None]
-        moved = (ramped(after - self._times, self.ease)[..., None] * self._changes).sum(axis=-2)
+        moved = (ramped(after - self._times, self._eases)[..., None] * self._changes).sum(axis=-2)
         start, duration, by = self._turns.T
         turned = (by * eased((after - start) / duration)).sum(axis=-1)
         steps = (moved[..., 0], moved[..., 1], turned)

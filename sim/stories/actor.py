@@ -18,6 +18,7 @@ from qpsafe.sim.stories.planning import Plan, Taken
 Array = NDArray[np.float64]
 
 WALK_RATIO = 0.0065  # step length [m] over cadence [steps/min], the same at all usual speeds: Sekiya et al. 1996
+HURRY, STRIDE = 2.01, (1.3, 1.1)  # steps are no longer than so many legs, up to a speed [m/s] and above
 STEP = 0.55, 0.40  # longest and shortest time of a step; Footsteps' own is the longest [s]
 
 
@@ -67,11 +68,15 @@ class Actor(Plan):
 
     @cached_property
     def _footsteps(self) -> Footsteps:
+        leg = self.person.body.thigh + self.person.body.shank
+
         def pace(times: Array) -> tuple[Array, Array]:
             """Time in the air and time with both feet down; the faster, the less of the latter."""
-            speed = self.course.speed(times + 0.4)
+            speeds = self.course.speed(times + np.array([[0.4], [0.0], [0.2], [0.7], [1.0]]))
+            speed, fastest = speeds[0], speeds.max(axis=0)
+            longest = np.where(fastest > HURRY, STRIDE[1], STRIDE[0]) * leg / np.maximum(fastest, 0.1)
             cadence = np.sqrt(60.0 * np.maximum(speed, 0.1) / (WALK_RATIO * self.person.body.scale))
-            step = np.clip(60.0 / cadence, STEP[1], STEP[0])
+            step = np.minimum(np.clip(60.0 / cadence, STEP[1], STEP[0]), longest)
             both = np.clip(0.30 - 0.10 * speed, 0.08, 0.20) * step
             return step - both, both
 

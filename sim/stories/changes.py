@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sim.people.paces import COSINE, paced
 from qpsafe.sim.people.posture import Point, between, goal_row
-from qpsafe.sim.people.walker import Root, Roots, eased
+from qpsafe.sim.people.walker import Root, Roots
 
 Array = NDArray[np.float64]
 
@@ -25,27 +26,32 @@ class Changes:
     def __init__(self, first: Sequence[float] | Array) -> None:
         """Begin at a row."""
         self.last, self.end = np.array(first, dtype=float), -math.inf
-        self._rows: list[tuple[float, float, float, Array, Array]] = [(-math.inf, 0.0, 0.0, self.last, self.last)]
+        self._rows: list[tuple[float, float, float, float, Array, Array]] = [
+            (-math.inf, 0.0, COSINE, 0.0, self.last, self.last)
+        ]
 
-    def add(self, start: float, end: float, to: Sequence[float] | Array, lift: float = 0.0) -> None:
+    def add(
+        self, start: float, end: float, to: Sequence[float] | Array, late: float = COSINE, lift: float = 0.0
+    ) -> None:
         """Append a change.
 
         Args:
             start: When it begins, not before the last one ends [s].
             end: When it is done [s].
             to: Row at its end.
+            late: How it goes, see `paces`.
             lift: For hands: how much higher than on the straight way in the middle of it [m].
         """
         row = np.array(to, dtype=float)
-        self._rows.append((start, end, lift, self.last, row))
+        self._rows.append((start, end, late, lift, self.last, row))
         self.last, self.end = row, end
 
     def __call__(self, times: Array) -> Array:
         """Rows at times (T,) [s]: (T, k)."""
-        start, end, lift, a, b = (np.array(column) for column in zip(*self._rows, strict=True))
+        start, end, late, lift, a, b = (np.array(column) for column in zip(*self._rows, strict=True))
         which = np.searchsorted(start, times, side="right") - 1
         start[0] = -1.0  # has been there for ever
-        share = eased((times - start[which]) / (end - start)[which])[:, None]
+        share = paced((times - start[which]) / (end - start)[which], late[which])[:, None]
         return between(a[which], b[which], share, lift[which, None])
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from qpsafe.errors import QpsafeError
+from qpsafe.sim.people.paces import COSINE
 from qpsafe.sim.people.posture import EDGE, HANG, Point
 from qpsafe.sim.people.walker import SHARP
 from qpsafe.sim.stories.steps import PersonTable
@@ -123,7 +124,7 @@ class Plan(TimeLine):
         if self.person.least_stoop(goals)[1] > 0.0:
             raise self._problem([*keys, "to"], step.to, "a point within reach while the other hand stays where it is")
         self._tilt(centre)
-        self._move_arms(goals, step.speed)
+        self._move_arms(goals, step.speed, _late(step), step.early)
 
     def _retract(self, step: Any, keys: list) -> None:
         goals = list(self._goals)
@@ -132,7 +133,14 @@ class Plan(TimeLine):
                 raise self._problem(keys, "retract", "hands that do not hold the board: put it down")
             goals[i] = HANG
         self._tilt(None)
-        self._move_arms(goals, step.speed)
+        self._move_arms(goals, step.speed, _late(step))
+
+    def _stumble(self, step: Any, keys: list) -> None:
+        if self._goals != [HANG, HANG]:
+            raise self._problem(keys, "stumble", "both hands free and hanging")
+        self._fall(self.end - step.early, math.radians(step.lean), step.speed)
+        self.end += step.down
+        self._rise(step.speed, step.rise)
 
     def _put_down(self, step: Any, keys: list) -> None:
         board = self.person.board
@@ -175,6 +183,11 @@ class Plan(TimeLine):
 
 
 _ARMS = {"left": (0,), "right": (1,), "both": (0, 1)}
+
+
+def _late(step: Any) -> float:
+    """How a hand goes, as `paces` has it."""
+    return COSINE if step.profile == "cosine" else float(step.late)
 
 
 def _text(place: Sequence[float]) -> str:

@@ -6,14 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from qpsafe.sim.people.anatomy import REACHING
+from qpsafe.sim.people.anatomy import HURRYING, REACHING
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-100.0, le=100.0)]
 Place = tuple[Finite, Finite]
 Point = tuple[Finite, Finite, Finite]
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=60)]
-WalkingSpeed = Annotated[float, Field(strict=True, ge=0.5, le=2.0)]
+WalkingSpeed = Annotated[float, Field(strict=True, ge=0.5, le=HURRYING)]
 HandSpeed = Annotated[float, Field(strict=True, ge=0.05, le=REACHING)]
+Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+Early = Annotated[float, Field(strict=True, ge=0.0, le=3.0)]
+Ease = Annotated[float, Field(strict=True, ge=0.2, le=5.0)]
 Time = Annotated[float, Field(strict=True, ge=0.0, le=3600.0)]
 
 
@@ -36,7 +39,8 @@ class WalkStep(Step):
     to: Place | Annotated[list[Place], Field(min_length=1)]
     speed: WalkingSpeed = 1.0
     facing: Literal["travel", "keep"] = "travel"
-    ease: Annotated[float, Field(strict=True, ge=0.2, le=5.0)] | None = None  # time to reach the speed, and to stop [s]
+    ease: Ease | None = None  # time to reach the speed, to go round a corner, and to stop [s]
+    stop: Ease | None = None  # to stop, if that takes another time [s]
 
 
 class WaitStep(Step):
@@ -53,25 +57,43 @@ class TurnStep(Step):
     do: Literal["turn"]
     heading: Annotated[float, Field(strict=True, ge=-360.0, le=360.0)] | None = None
     towards: Place | None = None
-    rate: Annotated[float, Field(strict=True, ge=10.0, le=300.0)] = 120.0
+    rate: Annotated[float, Field(strict=True, ge=10.0, le=400.0)] = 120.0
 
 
-class ReachStep(Step):
+class HandStep(Step):
+    """What steps that move hands on a chosen profile share: `late` moves the peak of the speed (minimum jerk only)."""
+
+    arm: Literal["left", "right", "both"] = "right"
+    speed: HandSpeed = 1.0
+    profile: Literal["cosine", "minimum-jerk"] = "cosine"
+    late: Share = 0.0
+
+
+class ReachStep(HandStep):
     """Bring a hand, or both, to a point of the world [m]; both stay `apart` from each other."""
 
     do: Literal["reach"]
     to: Point
-    arm: Literal["left", "right", "both"] = "right"
-    speed: HandSpeed = 1.0
     apart: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] = 0.16
+    early: Early = 0.0  # how long before the end of the step before it begins, while walking, say [s]
 
 
-class RetractStep(Step):
+class RetractStep(HandStep):
     """Let the arms hang again."""
 
     do: Literal["retract"]
     arm: Literal["left", "right", "both"] = "both"
-    speed: HandSpeed = 1.0
+
+
+class StumbleStep(Step):
+    """Fall forwards: the trunk leans, the hands are thrown ahead; then rise again. Speeds are seen from the walker."""
+
+    do: Literal["stumble"]
+    early: Early = 0.5  # as of a reach [s]
+    lean: Annotated[float, Field(strict=True, ge=5.0, le=60.0)] = 40.0  # [deg]
+    speed: Annotated[float, Field(strict=True, ge=0.3, le=3.0)] = 1.5
+    down: Annotated[float, Field(strict=True, ge=0.0, le=60.0)] = 0.3  # how long they stay so [s]
+    rise: Annotated[float, Field(strict=True, ge=0.2, le=10.0)] = 1.0  # time to rise [s]
 
 
 class PutDownStep(Step):
@@ -97,10 +119,10 @@ class LookStep(Step):
 
 
 AnyStep = Annotated[
-    WalkStep | WaitStep | TurnStep | ReachStep | RetractStep | PutDownStep | CarryStep | LookStep,
+    WalkStep | WaitStep | TurnStep | ReachStep | RetractStep | StumbleStep | PutDownStep | CarryStep | LookStep,
     Field(discriminator="do"),
 ]
-KINDS = ("walk", "wait", "turn", "reach", "retract", "put_down", "carry", "look")
+KINDS = ("walk", "wait", "turn", "reach", "retract", "stumble", "put_down", "carry", "look")
 
 
 class BoardTable(Table):

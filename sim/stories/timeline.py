@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.people.anatomy import Body
+from qpsafe.sim.people.paces import COSINE, minimum_jerk, peak
 from qpsafe.sim.people.person import Board, Person
-from qpsafe.sim.people.posture import EDGE, HANG, Point, Postures, Stoop, between, goal_row
+from qpsafe.sim.people.posture import EDGE, HANG, LEAN, Point, Postures, Stoop, between, goal_row
 from qpsafe.sim.people.walker import TURNING, Course, Turn, Walk
 from qpsafe.sim.stories.changes import Changes, world_row
 from qpsafe.sim.stories.steps import PersonTable
@@ -22,6 +23,9 @@ FARTHER = 0.15  # what is put down stands farther away than it is carried, past 
 SETTLE = 0.4  # time that the feet take after the root has stopped [s]
 LOOK = 0.6  # time to turn the head [s]
 NOD = math.radians(40.0)  # how far the head tilts
+SINK = 0.15  # how far the hips sink in a fall that leans as far as `LEAN` [m]
+THROW = math.radians(20.0)  # below level: where the hands are thrown in a fall
+BESIDE = 0.5  # how far from the root a hand is that hangs, at most [m]
 
 
 class TimeLine:
@@ -55,7 +59,7 @@ class TimeLine:
         x, y, _ = self.course.last
         if turning:
             self._face(math.atan2(points[0][1] - y, points[0][0] - x), TURNING)
-        self.end = self.course.add(Walk(self.end, self.course.last, points, step.speed, turning, step.ease))
+        self.end = self.course.add(Walk(self.end, self.course.last, points, step.speed, turning, step.ease, step.stop))
 
     def _face(self, heading: float, rate: float) -> None:
         angle = math.remainder(heading - self.course.last[2], 2.0 * math.pi)
@@ -63,23 +67,61 @@ class TimeLine:
             duration = max(2.0 * abs(angle) / rate, 0.3)
             self.end = self.course.add(Turn(self.end, self.end + duration, self.course.last, angle))
 
-    def _move_arms(self, goals: Sequence[Point | str], speed: float) -> None:
-        """Move both hands to goals, the back with them, with no hand faster than a speed [m/s]."""
-        if list(goals) == self._goals:
-            return
-        before, after = self._stoop, self.person.least_stoop(goals, self._at)[0]
+    def _move_arms(self, goals: Sequence[Point | str], speed: float, late: float = COSINE, early: float = 0.0) -> None:
+        """Move both hands to goals, the back with them; see `_swing`.
+
+        Args:
+            goals: Of left and right hand; points stay where they are in the world.
+            speed: Of the hands [m/s].
+            late: How they go, see `paces`.
+            early: How long before now they begin [s].
+        """
+        if list(goals) != self._goals:
+            start = self.end - early if early > 0.0 else max(self.end, self._settled)
+            after = self.person.least_stoop(goals, self._at)[0]
+            self._swing(start, goals, [world_row(goal, *self._here) for goal in goals], after, speed, late)
+
+    def _swing(
+        self,
+        start: float,
+        goals: Sequence[Point | str],
+        rows: Sequence[Array],
+        after: Stoop,
+        speed: float,
+        late: float,
+        least: float = 0.2,
+    ) -> None:
+        """Move both hands to goals and the back to a stoop, with no hand faster than a speed, seen from the walker.
+
+        Args:
+            start: When, or as soon as the last movement is done [s].
+            goals: Of left and right hand, in the root's frame at the end.
+            rows: The same as `world_row` has them.
+            after: Stoop at the end.
+            speed: Of the hands [m/s].
+            late: How they go, see `paces`.
+            least: Time that it takes at least [s].
+        """
+        start = max(start, 0.0, self._stoops.end, *(changes.end for changes in self._arms))
+        before = self._stoop
         ends, lifts = self._ways(goals, before, after, np.array([0.0, 1.0]), np.zeros((2, 1))), np.zeros((2, 1))
         for i, apart in enumerate(np.linalg.norm(ends[1] - ends[0], axis=1)):
             lifts[i] = 0.12 * apart * (self._goals[i] != goals[i])
-        path = self._ways(goals, before, after, np.linspace(0.0, 1.0, 41), lifts)
-        fastest = float(np.linalg.norm(np.diff(path, axis=0), axis=2).max()) * 40
-        self.end = max(self.end, self._settled)
-        end = self.end + max(2.0 * 1.01 * fastest / speed, 0.2)  # eased() goes at twice its mean rate
+        # the cosine's fastest rate counts wherever the hands' own is largest; of a minimum jerk the product is known
+        even, rate = np.linspace(0.0, 1.0, 41), peak(late)
+        path = self._ways(goals, before, after, even if late < 0.0 else minimum_jerk(even, late), lifts)
+        fastest = float(np.linalg.norm(np.diff(path, axis=0), axis=2).max()) * 40 * (rate if late < 0.0 else 1.0)
+        still = 0.0
+        if any(row[8] > 0.0 for row in rows):  # who still walks comes nearer to a point: so much longer is the way
+            x, y, heading = (float(value) for value in self.course(start))
+            still = math.dist((x, y), self.course.last[:2]) + BESIDE * abs(heading - self.course.last[2])
+        end = start + max(1.01 * (fastest + rate * still) / speed, least)
         for i, changes in enumerate(self._arms):
             if self._goals[i] != goals[i]:
-                changes.add(self.end, end, world_row(goals[i], *self._here), float(lifts[i, 0]))
+                changes.add(start, end, rows[i], late, float(lifts[i, 0]))
         self._goals = list(goals)
-        self._bend(after, end)
+        self._stoops.add(start, end, after, late)
+        self.end = max(self.end, end)
 
     def _ways(self, goals: Sequence[Point | str], before: Stoop, after: Stoop, shares: Array, lifts: Array) -> Array:
         """Hands (T, 2, 3) on their way from where they are to goals when so much of it is done (T,), standing."""
@@ -89,6 +131,29 @@ class TimeLine:
         stoop = (1.0 - share) * np.array(before) + share * np.array(after)
         postures = Postures(np.stack(rows, axis=1), stoop, np.zeros((1, 2)), np.array([self._at]))
         return self.person.poses(np.zeros((len(shares), 3)), None, postures).hands
+
+    def _fall(self, start: float, lean: float, speed: float) -> None:
+        """Lean forwards and throw both hands ahead of the shoulders, as far as they easily go.
+
+        Args:
+            start: When [s].
+            lean: Of the trunk [rad].
+            speed: Of the hands [m/s].
+        """
+        body, stoop = self.person.body, Stoop(lean, SINK * lean / LEAN * self.person.body.scale)
+        thrown = 0.75 * (body.upper_arm + body.forearm + body.hand)
+        ahead, down = thrown * math.cos(THROW), thrown * math.sin(THROW)
+        shoulders = self.person.shoulders(stoop)
+        goals: list[Point | str] = [(float(x) + ahead, float(y), float(z) - down) for x, y, z in shoulders]
+        begun = max(start, 0.0, self._gaze.end)
+        self._swing(start, goals, [np.pad(goal_row(goal), (0, 4)) for goal in goals], stoop, speed, late=1.0)
+        self._gaze.add(begun, max(self._stoops.end, begun + 0.2), (-0.5 * lean, 0.0))  # eyes ahead
+
+    def _rise(self, speed: float, least: float) -> None:
+        """Stand upright again with hanging arms, in so much time [s] or more."""
+        self._gaze.add(max(self.end, self._gaze.end), max(self.end, self._gaze.end) + LOOK, (0.0, 0.0))
+        hanging = world_row(HANG, *self._here)
+        self._swing(self.end, [HANG, HANG], [hanging, hanging], Stoop(), speed, late=0.0, least=least)
 
     @property
     def _here(self) -> tuple[tuple[float, float, float], float]:
