@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -43,11 +44,14 @@ class Distances:
 
     What is fixed to the world is not measured against furniture and floor: it cannot come nearer.
 
+    Args:
+        world: The world.
+        robot: Its robot.
+
     Attributes:
         world: The world.
         furniture: Pairs of shapes of which one is the robot's and one a piece of furniture, (m, 2).
         floors: Likewise with planes.
-        own: Pairs of the robot's own shapes, on bodies that are neither the same nor joined, and apart at home.
     """
 
     def __init__(self, world: World, robot: Robot) -> None:
@@ -56,6 +60,12 @@ class Distances:
         moving = [i for i in world.robot.tolist() if bodies[i] != 0]
         self.furniture = _pairs([(i, j) for i in moving for j in world.furniture.tolist()])
         self.floors = _pairs([(i, j) for i in moving for j in world.floors.tolist()])
+        self._robot = robot
+
+    @cached_property
+    def own(self) -> Index:
+        """Pairs of the robot's shapes, on bodies that are neither the same nor joined, and apart at home, (m, 2)."""
+        world, robot, bodies = self.world, self._robot, self.world.index[:, layout.BODY]
         parents = [0, *robot.tree.parents.tolist()]
         apart = [
             (i, j)
@@ -64,7 +74,7 @@ class Distances:
             if bodies[i] != bodies[j] and parents[bodies[i]] != bodies[j] and parents[bodies[j]] != bodies[i]
         ]
         poses = robot.at(robot.home).body_poses()
-        self.own = _pairs([pair for pair in apart if self.pairs(poses, _pairs([pair])).distance > TOUCHING])
+        return _pairs([pair for pair in apart if self.pairs(poses, _pairs([pair])).distance > TOUCHING])
 
     def people(self, poses: Array, people: tuple[Array, ...], at_most: float = np.inf) -> Nearest:
         """Smallest distance of the robot to anybody's body or board.

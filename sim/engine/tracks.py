@@ -69,7 +69,10 @@ class PersonTracks:
         segments = [segment for person in people for segment in person.body.segments]
         boards = [person.board for person in people if person.board is not None]
         return cls(
-            np.array([[pose.ends for pose in row] for row in poses]).reshape(len(poses), len(segments), 2, 3),
+            _of_length(
+                np.array([[pose.ends for pose in row] for row in poses]).reshape(len(poses), len(segments), 2, 3),
+                np.array([segment.length for segment in segments]),
+            ),
             np.array([segment.radius for segment in segments]),
             np.array([[_board(pose) for pose in row if pose.board_position is not None] for row in poses]).reshape(
                 len(poses), len(boards), 4, 4
@@ -87,13 +90,23 @@ class PersonTracks:
         return len(self.ends)
 
 
+def _of_length(ends: Array, lengths: Array) -> Array:
+    """Ends (T, S, 2, 3) around the same middles in the same directions, but of the segments' lengths (S,) [m].
+
+    A hand that a pose stretches, by millimetres, is a capsule of its own length in MuJoCo's scene: so it is here.
+    """
+    middles, axes = 0.5 * (ends[:, :, 0] + ends[:, :, 1]), ends[:, :, 1] - ends[:, :, 0]
+    offsets = (0.5 * lengths / np.sqrt((axes * axes).sum(axis=2)))[:, :, None] * axes
+    return np.stack((middles - offsets, middles + offsets), axis=2)
+
+
 def people_of(scene: Scene, data: Any) -> tuple[Array, Array, Array, Array, Array]:
     """People and boards as MuJoCo has them now, geom poses up to date: the same as a row of `PersonTracks`."""
     model, geoms, boards = scene.model, scene.person_geoms, scene.board_geoms
     radii, halves = model.geom_size[geoms, 0], model.geom_size[geoms, 1]
     offsets = halves[:, None] * data.geom_xmat[geoms][:, 2::3]  # along the third axis
-    places = data.geom_xpos[geoms]
-    ends = np.stack((places - offsets, places + offsets), axis=1)
+    places, ends = data.geom_xpos[geoms], np.empty((len(geoms), 2, 3))
+    ends[:, 0], ends[:, 1] = places - offsets, places + offsets
     poses = np.zeros((len(boards), 4, 4))
     poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = (
         data.geom_xmat[boards].reshape(-1, 3, 3),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -110,7 +111,8 @@ class World:
                 poses of the bodies `movable` must follow those of the robot's; by default it is left out.
 
         Raises:
-            ConfigurationError: A geom is of a kind that has no place here: a height field or a signed distance field.
+            ConfigurationError: A geom is of a kind that has no place here (a height field, a signed distance field),
+                or a mesh without volume.
         """
         model, data = scene.model, scene.make_data()
         owners, loose = _owners(scene)
@@ -206,11 +208,24 @@ def _is_seen(model: Any, geom: int) -> bool:
 
 
 def _mesh(model: Any, geom: int) -> HullMesh:
+    from scipy.spatial import QhullError
+
     mesh = int(model.geom_dataid[geom])
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     begin, number = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    vertices = model.mesh_vert[first : first + count].astype(np.float64)
-    return hull_mesh(vertices, model.mesh_face[begin : begin + number].astype(np.int64))
+    try:
+        return _hull_mesh(
+            model.mesh_vert[first : first + count].tobytes(), model.mesh_face[begin : begin + number].tobytes()
+        )
+    except QhullError:
+        raise ConfigurationError("World", f"mesh {model.mesh(mesh).name}", f"{count} vertices", "a volume") from None
+
+
+@lru_cache(maxsize=256)
+def _hull_mesh(vertices: bytes, triangles: bytes) -> HullMesh:
+    """Made once, since every experiment has the same robot; from MuJoCo's float32 and int32."""
+    places = np.frombuffer(vertices, dtype=np.float32).reshape(-1, 3).astype(np.float64)
+    return hull_mesh(places, np.frombuffer(triangles, dtype=np.int32).reshape(-1, 3).astype(np.int64))
 
 
 def _measure(row: Array, kind: int, place: Array, size: Array, points: Array | None) -> None:

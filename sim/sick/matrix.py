@@ -19,7 +19,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.speed_cap import wire_speed
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.sick.cases import CASES, WINDOW, Case, Reaction, Record, Window
-from qpsafe.sim.world.distance import board_distance, person_distance
+from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def _play(loop: FixedLoop, sick: NDArray[np.intp], before: Array, case: Case | N
     records: list[Record] = []
     sensing, robot = loop.controller.sensing, loop.controller.robot
     assert sensing is not None
-    anchor = None
+    anchor, gaps = None, TrueDistances(loop.scene)
     for k in range(WINDOW):
         fault = None
         if case is not None and k < case.lasts:
@@ -234,7 +234,7 @@ def _play(loop: FixedLoop, sick: NDArray[np.intp], before: Array, case: Case | N
                 wire_speed(tick.reference.qd, robot.at(tick.reference.q)),
                 tick.reference.q,
                 tick.reference.qd,
-                min(board_distance(loop.scene, loop.plant.data)[0], person_distance(loop.scene, loop.plant.data)[0]),
+                min(found.distance for found in gaps.measure(loop.plant.data)),
                 moved,
             )
         )

@@ -14,7 +14,7 @@ from qpsafe.sim.experiments.fixed.settings import FixedSettings
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.recording.log import Recorder, RunLog
-from qpsafe.sim.world.distance import board_distance, person_distance
+from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tasks.rotation import euler_zyx, log3
@@ -39,11 +39,12 @@ class FixedExperiment(FixedSettings):
         robot, scene, loop = self.robot, self.scene, FixedLoop(self)
         controller, plant = loop.controller, loop.plant
         assert controller.spots is not None
-        recorder = Recorder(controller.dt, controller.spots.names)
+        recorder, gaps = Recorder(controller.dt, controller.spots.names), TrueDistances(scene)
         for _ in range(round(self.duration / controller.dt)):
             tick, q, qd, distances, state = loop.step()
             goals = {name: target.sample(tick.path_time).pose for name, target in self.references.items()}
             commanded = robot.at(tick.reference.q)
+            board, person = gaps.measure(plant.data)
             measured = [pose_error(state.pose(name), goal) for name, goal in goals.items()]
             recorder.add(
                 tick,
@@ -52,7 +53,7 @@ class FixedExperiment(FixedSettings):
                 distances,
                 (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
                 np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
-                (board_distance(scene, plant.data).distance, person_distance(scene, plant.data).distance),
+                (board.distance, person.distance),
                 errors=own_errors(self, commanded, goals),
                 metrics=self.measured(tick, scene, plant),
             )
@@ -64,11 +65,11 @@ class FixedExperiment(FixedSettings):
     def board_distance_without_controller(self) -> NDArray[np.float64]:
         """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
         scene, walk, dt = self.scene, self.walk, 0.004
-        data, poses = scene.make_data(), PosesAhead(walk.people, dt)
+        data, poses, gaps = scene.make_data(), PosesAhead(walk.people, dt), TrueDistances(scene)
         result = np.empty(round(self.duration / dt))
         for k in range(len(result)):
             scene.place_people(data, poses(k))
-            result[k] = board_distance(scene, data).distance
+            result[k] = gaps.board(data).distance
         return result
 
 

@@ -12,7 +12,7 @@ from qpsafe.sim.experiments.pick_place.pick_loop import RELEASE, PickEvent, Pick
 from qpsafe.sim.experiments.pick_place.settings import SETTLE, PickPlaceSettings
 from qpsafe.sim.recording.log import Recorder, RunLog
 from qpsafe.sim.world.clearance import Furniture
-from qpsafe.sim.world.distance import person_distance
+from qpsafe.sim.world.distance import TrueDistances
 
 STATES = 10  # ticks between two states that are kept for pictures
 
@@ -72,7 +72,7 @@ class PickPlaceExperiment(PickPlaceSettings):
         controller, plant, scene, robot = loop.controller, loop.plant, loop.scene, self.robot
         assert controller.spots is not None
         recorder = Recorder(controller.dt, controller.spots.names)
-        furniture = Furniture(scene)
+        furniture, gaps = Furniture(scene), TrueDistances(scene)
         path_time, moving, states, clearance = [], [], [], []
         left, after = round(self.limit / controller.dt), round(SETTLE / controller.dt)
         done = 0
@@ -82,7 +82,7 @@ class PickPlaceExperiment(PickPlaceSettings):
             left, after = left - 1, after - (done >= self.cycles)
             pose, goal = state.pose("tcp"), self.reference.sample(tick.path_time).pose
             commanded = robot.at(tick.reference.q)
-            gap = person_distance(scene, plant.data).distance if self.people else np.inf
+            gap = gaps.person(plant.data).distance if self.people else np.inf
             recorder.add(
                 tick,
                 q,

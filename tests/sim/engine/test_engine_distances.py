@@ -164,6 +164,7 @@ def test_a_world_of_another_size_has_distances_of_that_size(encounters, factor):
     shapes[:, layout.SIZE :] *= factor
     planes[:, 3] *= factor
     large = Distances(world, ROBOT)
+    large.own = distances.own
     large.world = replace(world, shapes=shapes, planes=planes, vertices=world.vertices * factor)
     for poses, tracks in cases:
         poses, boards = poses.copy(), tracks.boards.copy()

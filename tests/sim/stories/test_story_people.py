@@ -16,7 +16,7 @@ from qpsafe.sim.people.person import Person
 from qpsafe.sim.people.posture import Arm, Posture, Stoop
 from qpsafe.sim.stories.file import StoryError, load_story, parse_story
 from qpsafe.sim.stories.story import Story
-from qpsafe.sim.world.distance import board_distance, person_distance
+from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.sim.world.scene import build_scene
 
 TEXT = """
@@ -306,13 +306,14 @@ def test_people_stand_in_the_scene_where_their_poses_are(story: Story) -> None:
             assert middle - half == pytest.approx(ends[0], abs=2e-3)
             assert middle + half == pytest.approx(ends[1], abs=2e-3)
         assert data.geom_xpos[scene.board_geom] == pytest.approx(poses[1].board_position, abs=1e-12)
-        assert np.isfinite(board_distance(scene, data).distance)
+        assert np.isfinite(TrueDistances(scene).board(data).distance)
     scene = build_scene(qpsafe.load_robot("irb140"), people=story.persons[:1])
     data = scene.make_data()
     assert scene.board_geom == -1
     scene.place_people(data, story.poses(3.0)[:1])
-    assert board_distance(scene, data).distance == np.inf
-    assert np.isfinite(person_distance(scene, data).distance)
+    board, person = TrueDistances(scene).measure(data)
+    assert board.distance == np.inf
+    assert np.isfinite(person.distance)
 
 
 @pytest.mark.parametrize("height", [height for heights in HEIGHTS.values() for height in heights])

@@ -14,7 +14,7 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.people.person import Board
 from qpsafe.sim.world.clearance import Furniture
-from qpsafe.sim.world.distance import board_distance, person_distance
+from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.robot_spec import shown_groups
 from qpsafe.sim.world.scene import ROBOT_COLLISION, SCENERY, build_scene
@@ -59,8 +59,8 @@ def test_groups_of_the_file_do_not_matter(seed: int, tmp_path: Path) -> None:
     np.testing.assert_array_equal(scene.model.geom_group, right.model.geom_group)
     np.testing.assert_array_equal(scene.robot_geoms, right.robot_geoms)
     data, same = scene.make_data(), right.make_data()
-    for distance in (board_distance, person_distance):
-        assert distance(scene, data).distance == pytest.approx(distance(right, same).distance, abs=1e-9)
+    for one, other in zip(TrueDistances(scene).measure(data), TrueDistances(right).measure(same), strict=True):
+        assert one.distance == pytest.approx(other.distance, abs=1e-9)
     assert len(known_obstacles(scene)) == len(known_obstacles(right))
 
 
@@ -74,7 +74,7 @@ def test_a_robot_without_pictures_of_its_own_is_seen_measured_and_no_furniture(l
     furniture = {names[g] for g in [*Furniture(scene).geoms, *np.flatnonzero(model.geom_group == SCENERY)]}
     assert not any(name.startswith("robot/") for name in furniture)
     data = scene.make_data()
-    assert np.isfinite(board_distance(scene, data).distance)
+    assert np.isfinite(TrueDistances(scene).board(data).distance)
     assert (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).sum() == 1  # the world's floor
 
 
