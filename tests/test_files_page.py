@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
+from qpsafe.sim.campaign.plan import PlanFile
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile
 
@@ -26,6 +27,7 @@ ROOTS: dict[str, type[BaseModel]] = {
     "Spots": SpotFile,
     "Robot": RobotFile,
     "Calibration": calibration._File,
+    "Campaign": PlanFile,
 }
 Row = tuple[str, str, str]  # key, unit, default
 
