@@ -16,6 +16,7 @@ from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
 from qpsafe.sim.campaign.people_tables import PeopleTable
+from qpsafe.sim.campaign.plan import PlanFile
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile
 
@@ -28,6 +29,7 @@ ROOTS: dict[str, type[BaseModel]] = {
     "Spots": SpotFile,
     "Robot": RobotFile,
     "Calibration": calibration._File,
+    "Campaign": PlanFile,
 }
 Row = tuple[str, str, str]  # key, unit, default
 

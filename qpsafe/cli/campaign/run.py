@@ -157,27 +157,26 @@ def _report(results: Results, folder: Path | None, screen: Console, json: bool) 
         raise typer.Exit(1)
 
 
+#: Measures of the printed table, besides contacts.
+_SHOWN = (
+    *("moving", "towards", "over_limit", "furniture", "self"),
+    *("distance_median", "distance_p10", "energy_p95", "lost_time_mean", "suspensions_mean"),
+)
+
+
 def show_table(found: dict[str, Any], screen: Console) -> None:
     """Print controllers by measures, comparisons with the first reference, and faults."""
     from qpsafe.cli.sheet import Sheet
-    from qpsafe.sim.campaign.report.measures import FIGURES, SHARES, percent
+    from qpsafe.sim.campaign.report.measures import MEASURES, percent
 
-    shares = [m for m in SHARES if m.name in ("contacts", "moving", "towards", "over_limit", "furniture", "self")]
-    names = ("distance_median", "distance_p10", "energy_p95", "lost_time_mean", "suspensions_mean")
-    figures = [m for m in FIGURES if m.name in names]
-    units = [f"{m.title} [{m.unit}]" if m.unit != "1" else m.title for m in figures]
+    measures = [MEASURES[name] for name in _SHOWN]
     done = found["trials"]["finished"]
     title = f"{done:,} of {found['trials']['planned']:,} trials, contacts with limits at 95 %"
-    sheet = Sheet(title, ("controller", "contacts", "", *(m.title for m in shares[1:]), *units))
+    sheet = Sheet(title, ("controller", "contacts", "", *(m.heading for m in measures)))
     for name, controller in found["controllers"].items():
         low, high = controller["intervals"]["contacts"]
-        sheet.add_row(
-            name,
-            f"{controller['contacts']:,}",
-            f"{percent(low)}-{percent(high)} %",
-            *(f"{controller[m.name]:,}" for m in shares[1:]),
-            *(m.shown(controller[m.name]) for m in figures),
-        )
+        values = (m.cells(controller)[0].partition(" ")[0] for m in measures)  # counts without their shares
+        sheet.add_row(name, f"{controller['contacts']:,}", f"{percent(low)}-{percent(high)} %", *values)
     screen.print(sheet)
     for reference in found["references"][:1]:
         _show_differences(found, reference, screen)
@@ -188,22 +187,18 @@ def show_table(found: dict[str, Any], screen: Console) -> None:
 def _show_differences(found: dict[str, Any], reference: str, screen: Console) -> None:
     """Contacts, distance and lost time, less those of a reference."""
     from qpsafe.cli.sheet import Sheet
-    from qpsafe.sim.campaign.report.measures import FIGURES
+    from qpsafe.sim.campaign.report.measures import MEASURES
 
-    figures = {m.name: m for m in FIGURES}
     items = {(i["controller"], i["measure"]): i for i in found["comparisons"] if i["reference"] == reference}
-    chosen = [figures[name] for name in ("distance_median", "lost_time_mean")]
-    heads = [text for m in chosen for text in (f"{m.title} [{m.unit}]", "95 %", "p")]
+    measures = [MEASURES[name] for name in ("distance_median", "lost_time_mean")]
+    heads = [text for m in measures for text in (m.heading, "95 %", "p")]
     title = f"Less {reference}, trial by trial, p corrected for all comparisons"
     sheet = Sheet(title, ("controller", "contacts more", "fewer", "p", *heads))
     for name in dict.fromkeys(controller for controller, _ in items):
         touched = items[name, "contacts"]
         cells = [f"{touched['only_controller']:,}", f"{touched['only_reference']:,}", f"{touched['p_holm']:.2g}"]
-        for measure in chosen:
-            item = items[name, measure.name]
-            low, high = item["interval"]
-            cells += [measure.shown(item["difference"], True), f"{measure.shown(low)} to {measure.shown(high)}"]
-            cells += [f"{item['p_holm']:.2g}"]
+        for measure in measures:
+            cells += [*measure.difference(items[name, measure.name]), f"{items[name, measure.name]['p_holm']:.2g}"]
         sheet.add_row(name, *cells)
     if sheet.rows:
         screen.print(sheet)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +29,28 @@ class ShareMeasure(NamedTuple):
     hits: Callable[[Columns], NDArray[np.bool_]]
     compared: bool = False
 
+    @property
+    def heading(self) -> str:
+        """Over its column."""
+        return self.title
+
+    def cells(self, found: dict[str, Any]) -> tuple[str, str]:
+        """Value and limits of a controller of a summary, as shown."""
+        count = found[self.name]
+        none = found["none_of_n"].get(self.name)
+        low, high = found["intervals"][self.name]
+        limits = (
+            f"{percent(low)} to {percent(high)} %" if none is None else f"below {100 * none['rule_of_three']:.2g} %"
+        )
+        return f"{count:,} ({percent(count / found['trials'])} %)", limits
+
+    def difference(self, item: dict[str, Any]) -> tuple[str, str]:
+        """Difference of a comparison of a summary, and how many trials make it, as shown."""
+        return (
+            f"{percent(item['difference'], True)} %",
+            f"+{item['only_controller']:,}, -{item['only_reference']:,} trials",
+        )
+
 
 class FigureMeasure(NamedTuple):
     """A mean or a quantile over all trials.
@@ -54,6 +76,22 @@ class FigureMeasure(NamedTuple):
     values: Callable[[Columns], Array]
     item: Statistic
     compared: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Over its column, with the unit."""
+        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+
+    def cells(self, found: dict[str, Any]) -> tuple[str, str]:
+        """Value and limits of a controller of a summary, as shown."""
+        return self.shown(found[self.name]), self._limits(found["intervals"][self.name])
+
+    def difference(self, item: dict[str, Any]) -> tuple[str, str]:
+        """Difference of a comparison of a summary and its limits, as shown."""
+        return self.shown(item["difference"], True), self._limits(item["interval"])
+
+    def _limits(self, interval: Sequence[float]) -> str:
+        return " to ".join(self.shown(limit) for limit in interval)
 
     def shown(self, value: float, signed: bool = False) -> str:
         """A value in its unit as shown, without the unit."""
@@ -154,6 +192,9 @@ FIGURES = (
         _or_zero("reversals"), MEAN,
     ),
 )  # fmt: skip
+
+
+MEASURES: dict[str, ShareMeasure | FigureMeasure] = {measure.name: measure for measure in (*SHARES, *FIGURES)}
 
 
 def percent(share: float, signed: bool = False) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.report.figures import distance_figure, energy_figure, harm_figure, kinds_figure, svg
 from qpsafe.sim.campaign.report.html import Html, element, joined, page, table
-from qpsafe.sim.campaign.report.measures import FIGURES, SHARES, FigureMeasure, ShareMeasure, percent
+from qpsafe.sim.campaign.report.measures import FIGURES, MEASURES, SHARES, FigureMeasure, ShareMeasure, percent
 from qpsafe.sim.campaign.rows import COLUMNS, of_controller
 from qpsafe.sim.campaign.runner import Results
 from qpsafe.text.words import counted
@@ -53,8 +53,8 @@ def _sections(results: Results, found: dict[str, Any]) -> Iterator[Html]:
     yield element("h2", "Harm against cycle time")
     yield _figure(svg(harm_figure(controllers), "harm"), "Boxes: limits at 95 % in both directions. Best is down left.")
     yield element("h2", "Contacts and work")
-    yield _shares(controllers)
-    yield _figures(controllers)
+    yield _measured(controllers, SHARES, "trials with")
+    yield _measured(controllers, FIGURES, "mean or quantile")
     yield element("h2", "Kinds of contact")
     yield _figure(
         svg(kinds_figure(controllers), "kinds"), "What the robot's touching point did one tick before contact."
@@ -97,51 +97,25 @@ def _cell(value: str, below: str) -> Html:
     return joined((value, element("small", below)))
 
 
-def _share(found: dict[str, Any], measure: ShareMeasure) -> Html:
-    low, high = found["intervals"][measure.name]
-    count = found[measure.name]
-    none = found["none_of_n"].get(measure.name)
-    limits = f"{percent(low)} to {percent(high)} %" if none is None else f"below {100 * none['rule_of_three']:.2g} %"
-    return _cell(f"{count:,} ({percent(count / found['trials'])} %)", limits)
-
-
-def _shares(controllers: dict[str, Any]) -> Html:
-    lines = [[name, *(_share(found, measure) for measure in SHARES)] for name, found in controllers.items()]
-    return table(["trials with", *(measure.title for measure in SHARES)], lines)
-
-
-def _figures(controllers: dict[str, Any]) -> Html:
-    def cell(found: dict[str, Any], measure: FigureMeasure) -> Html:
-        low, high = found["intervals"][measure.name]
-        return _cell(measure.shown(found[measure.name]), f"{measure.shown(low)} to {measure.shown(high)}")
-
-    lines = [[name, *(cell(found, measure) for measure in FIGURES)] for name, found in controllers.items()]
-    return table(["mean or quantile", *(f"{m.title} [{m.unit}]" if m.unit != "1" else m.title for m in FIGURES)], lines)
+def _measured(controllers: dict[str, Any], measures: Sequence[ShareMeasure | FigureMeasure], first: str) -> Html:
+    lines = [[name, *(_cell(*m.cells(found)) for m in measures)] for name, found in controllers.items()]
+    return table([first, *(m.heading for m in measures)], lines)
 
 
 def _compared(found: dict[str, Any], reference: str) -> Html:
     """Differences to a reference; bold where they are significant."""
-    measures: dict[str, ShareMeasure | FigureMeasure] = {m.name: m for m in (*SHARES, *FIGURES) if m.compared}
     lines: dict[str, list[str]] = {}
     for item in (item for item in found["comparisons"] if item["reference"] == reference):
-        measure, (low, high) = measures[item["measure"]], item["interval"]
-        if isinstance(measure, FigureMeasure):
-            value, limits = measure.shown(item["difference"], True), f"{measure.shown(low)} to {measure.shown(high)}"
-        else:
-            value = percent(item["difference"], True)
-            limits = f"+{item['only_controller']}, -{item['only_reference']} trials"
+        value, limits = MEASURES[item["measure"]].difference(item)
         small = element("small", limits, element("br"), f"p = {item['p_holm']:.2g}")
         head = element("strong", value) if item["p_holm"] < LEVEL else value
         lines.setdefault(item["controller"], []).append(joined((head, small)))
-    heads = [
-        f"{m.title} [{'% of trials' if isinstance(m, ShareMeasure) else m.unit}]".replace(" [1]", "")
-        for m in measures.values()
-    ]
     caption = (
         f"Less {reference}: differences with limits, or trials in which it happened to the one only; p after "
         f"correction, bold below {LEVEL}."
     )
-    return joined((element("p", caption), table(["controller", *heads], [[k, *v] for k, v in lines.items()])))
+    heads = ["controller", *(m.heading for m in MEASURES.values() if m.compared)]
+    return joined((element("p", caption), table(heads, [[k, *v] for k, v in lines.items()])))
 
 
 def _motions(controllers: dict[str, Any]) -> Html:

@@ -41,6 +41,12 @@ def _made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture
+def _plain_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take most of a command's time; tests/sim/campaign looks at the page."""
+    monkeypatch.setattr("qpsafe.sim.campaign.report.page.report_page", lambda results, found: json_text(found))
+
+
 def campaign(*arguments: str) -> Any:
     return CliRunner().invoke(app, ["campaign", *arguments])
 
@@ -79,6 +85,7 @@ def test_a_quick_one_compares_all_and_needs_no_pyarrow(monkeypatch: pytest.Monke
         assert "qpsafe[campaign]" in str(refused.exception)
 
 
+@pytest.mark.usefixtures("_plain_page")
 def test_a_folder_is_named_after_the_plan_and_the_same_command_goes_on(tmp_path: Path) -> None:
     assert campaign(*FEW).exit_code == 0
     (folder,) = (tmp_path / "out").iterdir()
@@ -91,6 +98,7 @@ def test_a_folder_is_named_after_the_plan_and_the_same_command_goes_on(tmp_path:
     assert len(list((tmp_path / "out").iterdir())) == 2
 
 
+@pytest.mark.usefixtures("_plain_page")
 def test_a_file_says_the_plan_and_options_go_before_it(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text('trials = 9\nseed = 3\ncontrollers = ["stop", "default"]\nlag = 0.02\n')
     report = json.loads(campaign("plan.toml", "--seed", "8", "--json", "--workers", "1").stdout)
@@ -113,6 +121,7 @@ def test_a_broken_controller_is_printed_and_the_exit_code_says_so(monkeypatch: p
     assert json.loads(campaign(*FEW, "--trials", "20", "--quick", "--json").stdout)["findings"]
 
 
+@pytest.mark.usefixtures("_plain_page")
 def test_a_folder_is_reported_again(tmp_path: Path) -> None:
     campaign(*FEW, "--out", "kept")
     pages = [tmp_path / "kept" / name for name in ("report.html", "report.json")]
@@ -157,6 +166,7 @@ def test_what_cannot_be_asked_is_named_and_nothing_is_written(arguments: list[st
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.usefixtures("_plain_page")
 def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(tmp_path: Path) -> None:
     campaign(*FEW, "--out", "kept")
     before = {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()}
