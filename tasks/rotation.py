@@ -17,11 +17,6 @@ def exp3(w: NDArray[np.float64]) -> NDArray[np.float64]:
     return pin.exp3(w)
 
 
-def exp3_jacobian(w: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angular velocity, world axes, of exp(w(t)) per dw/dt (3, 3)."""
-    return pin.Jexp3(-w)  # pinocchio's is for body axes: its value at -w is its transpose
-
-
 def is_rotation(R: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
     """Whether R (3, 3) is orthogonal with determinant +1 within `tolerance`."""
     return bool(np.abs(R @ R.T - np.eye(3)).max() <= tolerance and np.linalg.det(R) > 0.0)

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.tasks.rotation import exp3, exp3_jacobian, is_rotation, log3
+from qpsafe.tasks.offset import displaced, offset_of
+from qpsafe.tasks.rotation import is_rotation, log3
 from qpsafe.text.words import call
 
 
@@ -39,19 +40,11 @@ class Sample(NamedTuple):
 
     def offset(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far a pose is from the reference: shift, then rotation vector, world axes (6,) [m, rad]."""
-        offset, pose = np.empty(6), self.pose
-        offset[:3] = value[:3, 3] - pose[:3, 3]
-        offset[3:] = log3(value[:3, :3] @ pose[:3, :3].T)
-        return offset
+        return offset_of(value, self.pose)
 
     def displaced(self, offset: NDArray[np.float64], rate: NDArray[np.float64]) -> Sample:
         """The reference moved by an offset (6,) that changes by `rate` (6,) [m/s, rad/s]."""
-        vector = offset[3:]
-        turn, pose, twist = exp3(vector), self.pose.copy(), self.twist + rate
-        pose[:3, 3] += offset[:3]
-        pose[:3, :3] = turn @ self.pose[:3, :3]
-        twist[3:] = turn @ self.twist[3:] + exp3_jacobian(vector) @ rate[3:]
-        return Sample(pose, twist)
+        return Sample(*displaced(self.pose, self.twist, offset, rate))
 
 
 class JointSample(NamedTuple):

@@ -25,6 +25,7 @@ laws recovery
 pipeline
 tick
 controller
+batch
 plugins placement irc5 irc5.records bench
 sim.people sim.world sim.engine
 sim.stories sim.recording

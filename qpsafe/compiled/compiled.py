@@ -85,23 +85,25 @@ seconds: dict[str, float] = {}
 """Processor time [s] that compiling each kernel, or loading it from the cache, took in this process."""
 
 
-def entry(types_: Any, *uses: ModuleType) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def entry(types_: Any, *uses: ModuleType, nogil: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile for one signature at import, from numba's cache where this machine has a place for one.
 
     Args:
         types_: Types of arguments and result.
         uses: Other modules whose compiled code goes into this one, beside this and `memory`. numba's cache notices
             changes of the entry's own file only; so the name it is kept under tells the state of these.
+        nogil: Whether other threads may run meanwhile; memory that is handed in must then be the thread's own.
     """
+    options = {**OPTIONS, "nogil": nogil}
 
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         kernel = f"{function.__module__}.{function.__name__}"
         function.__qualname__ += f"_{checksum(sys.modules[__name__], memory, *uses):08x}"
         with _watch.over(kernel):
             try:
-                return numba.njit(types_, cache=True, **OPTIONS)(function)
+                return numba.njit(types_, cache=True, **options)(function)
             except RuntimeError:  # no directory that numba may write to
-                return numba.njit(types_, **OPTIONS)(function)
+                return numba.njit(types_, **options)(function)
 
     return compiled
 

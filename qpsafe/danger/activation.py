@@ -11,14 +11,54 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.compiled.compiled import inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.text.words import call, counted
+
+
+def switch(danger: float, start: float, end: float, delta: float, epsilon: float) -> float:
+    """A smooth switch; anything that is not a number counts as full danger and gives 0.
+
+    Args:
+        danger: CDF_n.
+        start, end: Δ(1-ε) and Δ(1+ε).
+        delta, epsilon: Δ and ε.
+    """
+    if danger <= start:
+        return 1.0
+    if danger < end:
+        # (19), (21)
+        return 0.5 - 0.5 * math.sin(math.pi * (danger - delta) / (2.0 * epsilon * delta))
+    return 0.0
+
+
+switch_compiled = inline(switch)
+
+
+def multiply(switches: Any, counts: Any, activations: Any) -> Any:
+    """Fill in and return the activations: products of the first switches, (m, m f, ...).
+
+    Args:
+        switches: One a level of danger; a list or an array.
+        counts: How many tasks each of them switches.
+        activations: One a task.
+    """
+    product, first = 1.0, 0
+    for k in range(len(counts)):
+        product *= switches[k]
+        for task in range(first, first + counts[k]):
+            activations[task] = product
+        first += counts[k]
+    return activations
+
+
+multiply_compiled = inline(multiply)
 
 
 @dataclass(frozen=True)
@@ -51,12 +91,7 @@ class Threshold:
 
     def __call__(self, danger: float) -> float:
         """Evaluate the switch; anything that is not a number counts as full danger and gives 0."""
-        if danger <= self.start:
-            return 1.0
-        if danger < self.end:
-            # (19), (21)
-            return 0.5 - 0.5 * math.sin(math.pi * (danger - self.delta) / (2.0 * self.epsilon * self.delta))
-        return 0.0
+        return switch(danger, self.start, self.end, self.delta, self.epsilon)
 
 
 #: Names of the regimes by the number of tasks that are kept, for one and for two tasks (Table I).
@@ -90,7 +125,7 @@ class Activation(Fixed):
             Δ_f (1+ε_f) > Δ (1-ε): Table I's impossible situation m = 0, f = 1 must not come near.
     """
 
-    fixed = frozenset(("thresholds", "levels"))
+    fixed = frozenset(("thresholds", "levels", "counts"))
 
     def __init__(self, thresholds: tuple[Threshold, ...] = (Threshold(11.5, 0.15), Threshold(7.5, 0.25))) -> None:
         self.thresholds = tuple(thresholds)
@@ -98,7 +133,7 @@ class Activation(Fixed):
             raise ConfigurationError("Activation", "thresholds", thresholds, "at least one Threshold")
         # the different ones, and the number of tasks that each one switches
         self.levels = tuple(threshold for threshold, _ in groupby(self.thresholds))
-        self._counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
+        self.counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
         n = len(self.levels)
         self._names = REGIME_NAMES.get(n, ("high", *(f"medium-{kept}" for kept in range(1, n)), "low"))
         self._calm = Switching((1.0,) * n, (1.0,) * len(self.thresholds), self._names[-1])
@@ -126,12 +161,7 @@ class Activation(Fixed):
 
     def activations(self, cdf_n: float) -> tuple[float, ...]:
         """Activations a_1..a_N = products of the first switches: (m, m f, ...); (m, m, m f, m f) for two and two."""
-        result: list[float] = []
-        product = 1.0
-        for switch, count in zip(self.switches(cdf_n), self._counts, strict=True):
-            product *= switch
-            result += [product] * count
-        return tuple(result)
+        return tuple(multiply(self.switches(cdf_n), self.counts, [1.0] * len(self.thresholds)))
 
     def at(self, cdf_n: float) -> Switching:
         """Switches, activations and the regime's name, in one pass.
@@ -148,17 +178,9 @@ class Activation(Fixed):
             return Switching(self.switches(cdf_n), found, self.regime(cdf_n))
         if cdf_n <= self.levels[-1].start:  # below the lowest threshold
             return self._calm
-        switches, activations = [], []
-        product, kept = 1.0, 0
-        for threshold, count in zip(self.levels, self._counts, strict=True):
-            if cdf_n <= threshold.start:
-                switches.append(1.0)
-                kept += 1
-            else:
-                switches.append(threshold(cdf_n))
-                product *= switches[-1]
-            activations += [product] * count
-        return Switching(tuple(switches), tuple(activations), self._names[kept])
+        switches = tuple([threshold(cdf_n) for threshold in self.levels])
+        activations = multiply(switches, self.counts, [1.0] * len(self.thresholds))
+        return Switching(switches, tuple(activations), self.regime(cdf_n))
 
     def kept(self, cdf_n: float) -> int:
         """Number of tasks not yet being released: N in low danger, 0 in high danger."""

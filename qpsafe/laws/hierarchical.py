@@ -6,11 +6,12 @@ import functools
 import math
 from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.compiled.compiled import inline
 from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
@@ -120,14 +121,27 @@ class HierarchicalLaw(Fixed):
         return solve_hierarchy(levels, problem.lower, problem.upper, self.solver, damping=damping)
 
 
-def weights_of(activations: Sequence[float]) -> list[float]:
-    """`regime_weights` as a list: w_k = a_k - a_(k+1), a_0 = 1, a_(N+1) = 0."""
-    weights, above = [], 1.0
-    for a in activations:
-        weights.append(above - a)
-        above = a
-    weights.append(above)
+def weigh(activations: Any, weights: Any) -> Any:
+    """Fill in and return `regime_weights`: w_k = a_k - a_(k+1), a_0 = 1, a_(N+1) = 0.
+
+    Args:
+        activations: (tasks,), a sequence or an array.
+        weights: (tasks + 1,), a list or an array.
+    """
+    above = 1.0
+    for k in range(len(activations)):
+        weights[k] = above - activations[k]
+        above = activations[k]
+    weights[len(activations)] = above
     return weights
+
+
+weigh_compiled = inline(weigh)
+
+
+def weights_of(activations: Sequence[float]) -> list[float]:
+    """`regime_weights` as a list."""
+    return weigh(activations, [0.0] * (len(activations) + 1))
 
 
 class BlendResult(LawResult):

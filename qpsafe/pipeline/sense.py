@@ -79,7 +79,7 @@ class Sense:
         counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]
         self._still = np.zeros(robot.nq)
         self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
-        self._blocks = pack(self._sizes, given, given)
+        self.blocks = pack(self._sizes, given, given)
         self._work = np.empty(work_size(self._sizes, counts[0]))
 
     def __call__(
@@ -116,7 +116,7 @@ class Sense:
         points, links, danger, vectors = np.empty((k, 3)), np.empty(k, np.int64), np.empty(k), np.empty((k, 3))
         qd0 = np.empty(len(q))
         count, dead, out, cdf_n = sense_readings(
-            q, qd, distances, sensing.as_ages(ages), *self._blocks, *sensing.memory, self._before, self._work,
+            q, qd, distances, sensing.as_ages(ages), *self.blocks, *sensing.memory, self._before, self._work,
             points, links, danger, vectors, qd0,
         )  # fmt: skip
         if count < 0:
@@ -137,7 +137,7 @@ class Sense:
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0, work = np.empty(len(q)), np.empty(work_size(self._sizes, p))
         count, cdf_n = sense_points(
-            q, qd, given, *self._blocks, self._before, work, points, links, danger, vectors, qd0
+            q, qd, given, *self.blocks, self._before, work, points, links, danger, vectors, qd0
         )  # fmt: skip
         if count == -1:
             refuse(q, qd, self._robot)

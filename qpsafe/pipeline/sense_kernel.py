@@ -67,24 +67,37 @@ def work_size(sizes: tuple[int, ...], points: int) -> int:
 
 
 @inline
+def is_measurement(q: Array, qd: Array, f: Array, i: Index) -> bool:
+    """Whether position and velocity are finite and not absurd."""
+    plausible = view(f, i[PLAUSIBLE], (4, i[JOINTS]))
+    sane = True
+    for j in range(i[JOINTS]):
+        sane = sane and plausible[0, j] <= q[j] <= plausible[1, j]  # false for NaN
+        sane = sane and plausible[2, j] <= qd[j] <= plausible[3, j]
+    return sane
+
+
+@inline
+def place_bodies(q: Array, f: Array, i: Index, memory: Array) -> None:
+    """Kinematics of a configuration (n,), contiguous; see `kinematics.forward`."""
+    n, k = i[JOINTS], i[ENDS]
+    _forward(
+        q, view(i, i[PARENTS], (n,)), view(f, i[PLACEMENTS], (n, 4, 4)), view(f, i[AXES], (n, 6)),
+        view(f, i[SUPPORTS], (n + 1, n)), view(i, i[END_BODIES], (k,)), view(f, i[END_PLACES], (k, 3)), memory,
+    )  # fmt: skip
+
+
+@inline
 def _stand(q: Array, qd: Array, f: Array, i: Index, work: Array) -> bool:
     """Kinematics and wire of a measurement; False, and nothing done, if it is none."""
     n, k, m = i[JOINTS], i[ENDS], i[LINKS]
-    plausible = view(f, i[PLAUSIBLE], (4, n))
-    sane = True
-    for j in range(n):
-        sane = sane and plausible[0, j] <= q[j] <= plausible[1, j]  # false for NaN
-        sane = sane and plausible[2, j] <= qd[j] <= plausible[3, j]
-    if not sane:
+    if not is_measurement(q, qd, f, i):
         return False
     contiguous = view(work, i[MEMORY] + 12 * m, (n,))
     for j in range(n):
         contiguous[j] = q[j]
     memory = view(work, 0, (i[MEMORY],))
-    _forward(
-        contiguous, view(i, i[PARENTS], (n,)), view(f, i[PLACEMENTS], (n, 4, 4)), view(f, i[AXES], (n, 6)),
-        view(f, i[SUPPORTS], (n + 1, n)), view(i, i[END_BODIES], (k,)), view(f, i[END_PLACES], (k, 3)), memory,
-    )  # fmt: skip
+    place_bodies(contiguous, f, i, memory)
     wire = view(work, i[MEMORY], (4, m, 3))
     _wire_of(memory, k, qd, view(i, i[STARTS], (m,)), view(i, i[STOPS], (m,)), wire)
     return True

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.recovery import steps
 from qpsafe.recovery.events import Cursor
-from qpsafe.recovery.returns import RecoveryRules, Return, minimum_jerk, run_out
+from qpsafe.recovery.returns import RecoveryRules, Return
+from qpsafe.recovery.steps import FINITE, HOLD, MET, PHASES, SET_OUT
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.trajectory import FixedJoints
 
@@ -23,9 +25,22 @@ if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
-__all__ = ["FOLLOWING", "RECOVERING", "SUSPENDED", "Recovery", "RecoveryRules", "minimum_jerk", "run_out"]
+__all__ = ["FOLLOWING", "RECOVERING", "SUSPENDED", "Recovery", "RecoveryRules"]
 
-FOLLOWING, SUSPENDED, RECOVERING = "following", "suspended", "recovering"
+FOLLOWING, SUSPENDED, RECOVERING = PHASES
+_Of = tuple["Recovery", "RobotState", tuple[float, ...]]
+
+
+def _answer(question: int, of: _Of, time: float) -> bool:
+    return of[0].answer(question, of, time)
+
+
+def _too_fast(of: tuple[RecoveryRules, NDArray[np.float64], bool, Sequence[int]]) -> bool:
+    return of[0].too_fast(*of[1:])
+
+
+_next_phase, _advance = steps.phases_by(_answer)
+_way_on = steps.ways_by(_too_fast)
 
 
 class Recovery:
@@ -49,7 +64,8 @@ class Recovery:
         self._dt = dt
         self._rules = RecoveryRules() if rules is None else rules
         self.phase = FOLLOWING
-        self._kept = math.exp(-dt / self.rules.fade)  # of the speed of a held task, from tick to tick
+        #: What is left of the speed of a held task, from tick to tick.
+        self.kept = math.exp(-dt / self.rules.fade)
         self.path_time = 0.0
         self.paused = False
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
@@ -132,7 +148,7 @@ class Recovery:
         Raises:
             ValueError: A trajectory is not finite; the phase stays as it was.
         """
-        self._next_phase(cdf_n, state, activations)
+        self._next_phase(cdf_n, (self, state, activations))
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
             samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
             # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
@@ -173,25 +189,40 @@ class Recovery:
                 cursor.count = count
         self._due = None
 
-    def _next_phase(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> None:
+    def _next_phase(self, cdf_n: float, of: _Of) -> None:
         self.waits_for = ()
-        if self._changed:
-            if self.phase == FOLLOWING and self._not_met(state, (1.0,) * len(self.tasks)):
-                self._suspend()
-            self._changed = False
-        if not cdf_n <= self.suspend_above and self.rules.enabled:
+        before = PHASES.index(self.phase)
+        danger = not cdf_n <= self.suspend_above and self.rules.enabled
+        phase, anew = _next_phase(before, self._changed, danger, self.path_time, of)
+        self._changed, self.phase = False, PHASES[phase]
+        if anew:
             self._suspend()
-        elif self.phase == SUSPENDED:
+        elif before == phase == steps.FOLLOWING:
+            clock = self.path_time, self._rate, self.paused, self._dt / self._rules.ramp, self._dt
+            self.path_time, self._rate, waits = _advance(*clock, of)
+            if waits:
+                self.waits_for = self._not_met(of[1], (1.0,) * len(self.tasks))
+
+    def answer(self, question: int, of: _Of, time: float) -> bool:
+        """Answer what the steps of the state machine ask, see `qpsafe.recovery.steps`.
+
+        Args:
+            question: Its code.
+            of: Itself, the commanded configuration, the activations.
+            time: On the path [s].
+        """
+        _, state, activations = of
+        if question == steps.DUE:
+            return any(cursor.due(time) for cursor in self._cursors)
+        if question == MET:
+            return not self._not_met(state, (1.0,) * len(self.tasks))
+        if question == FINITE:
             for task in self.tasks:
                 if not task.trajectory.sample(self.path_time).finite:  # stay suspended, try again at the next tick
                     raise ValueError(f"the trajectory of the {task.name} task is not finite")
-            self.phase = RECOVERING
-        elif self.phase == RECOVERING:
-            self.waits_for = self._not_back(activations) or self._not_met(state, activations)
-            if not self.waits_for:
-                self.phase = FOLLOWING
-        else:
-            self._advance(state)
+            return True
+        self.waits_for = self._not_back(activations) or self._not_met(state, activations)
+        return not self.waits_for
 
     def lead(self, posture: NDArray[np.float64]) -> bool:
         """Return through the joints, straight to a posture (n,) [rad], and from there to the path.
@@ -213,22 +244,10 @@ class Recovery:
         return True
 
     def _suspend(self) -> None:
-        self.phase, self._rate = SUSPENDED, 0.0
+        self._rate = 0.0
         self._way, self._led = None, False
         self._returns = [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
-
-    def _advance(self, state: RobotState) -> None:
-        """Let the clock run, at an event only when the tasks are met: no grip beside the part."""
-        step = self._dt / self._rules.ramp
-        self._rate = max(self._rate - step, 0.0) if self.paused else min(self._rate + step, 1.0)
-        ahead = self.path_time + self._rate * self._dt
-        for cursor in self._cursors:
-            if cursor.due(ahead):
-                self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))
-                if self.waits_for:
-                    return
-        self.path_time = ahead
 
     def _reference(self, k: int, state: RobotState, active: float) -> Any:
         task = self.tasks[k]
@@ -242,14 +261,15 @@ class Recovery:
             raise ValueError(f"the trajectory of the {task.name} task is not finite")
         offset, before, joints = task.offset(value, sample), self._offset_before(k), value.ndim == 1
         back, self._offsets[k] = self._returns[k], offset
-        if back is not None and active >= 1.0:
-            back = back.later(self.dt)
-        else:
-            rate = np.zeros_like(offset) if before is None else (offset - before) / self.dt
-            if not active >= 1.0 or self.rules.too_fast(rate, joints, getattr(task, "rows", range(6))):
-                self._returns[k] = None  # held, not pulled: its motion runs out
-                return sample.displaced(offset, self._kept * rate)
+        rate = np.zeros_like(offset) if before is None else (offset - before) / self.dt
+        way = _way_on(back is not None, active >= 1.0, (self.rules, rate, joints, getattr(task, "rows", range(6))))
+        if way == HOLD:
+            self._returns[k] = None  # held, not pulled: its motion runs out
+            return sample.displaced(offset, self.kept * rate)
+        if way == SET_OUT:
             back = Return(offset, rate, self.rules.duration(offset, joints))  # x_d,r is where the task is now
+        else:
+            back = back.later(self.dt)
         self._returns[k] = back
         if back.time >= back.duration:
             self._returns[k], self._pending[k] = None, False

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import JointLimits
+from qpsafe.recovery.steps import fading, length, minimum_jerk, return_time, run_out
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,8 @@ class RecoveryRules:
         if joints:
             mean = float(np.abs(offset).max()) / self.joint_speed
         else:
-            shift, turn = float(np.linalg.norm(offset[:3])), float(np.linalg.norm(offset[3:]))
-            mean = max(shift / self.speed, turn / self.angular_speed)
-        return max(15.0 / 8.0 * mean, self.shortest)
+            mean = max(length(*offset[:3].tolist()) / self.speed, length(*offset[3:].tolist()) / self.angular_speed)
+        return return_time(mean, self.shortest)
 
     def too_fast(self, rate: NDArray[np.float64], joints: bool, rows: Sequence[int]) -> bool:
         """Whether a rate of an offset (6,) or (n,) is above the peak speed of a return.
@@ -73,7 +73,7 @@ class RecoveryRules:
         """
         if joints:
             return not float(np.abs(rate).max()) <= self.joint_speed
-        linear, angular = float(np.linalg.norm(rate[:3])), float(np.linalg.norm(rate[3:]))
+        linear, angular = length(*rate[:3].tolist()), length(*rate[3:].tolist())
         moves, turns = min(rows) < 3, max(rows) >= 3
         return (moves and not linear <= self.speed) or (turns and not angular <= self.angular_speed)
 
@@ -100,11 +100,9 @@ class Return:
 
     def displace(self, sample: Any) -> Any:
         """The reference with what is left of the offset."""
-        T = self.duration
-        s, ds = minimum_jerk(self.time / T)
-        r, dr = run_out(self.time / T)
-        offset, speed = self.offset, self.speed
-        return sample.displaced((1.0 - s) * offset + (r * T) * speed, (-ds / T) * offset + dr * speed)
+        share = self.time / self.duration
+        a, b, c, d = fading(*minimum_jerk(share), *run_out(share), self.duration)
+        return sample.displaced(a * self.offset + b * self.speed, c * self.offset + d * self.speed)
 
 
 class GentleLimits:
@@ -133,15 +131,3 @@ class GentleLimits:
             self._made = limits, limits.gentler(self._share)
         gentle = self._made[1]
         return limits if any(gentle.box(q, qd, qdd).sacrificed.tolist()) else gentle
-
-
-def minimum_jerk(tau: float) -> tuple[float, float]:
-    """s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ and ds/dτ for τ in [0, 1]: from rest to rest."""
-    tau = min(max(tau, 0.0), 1.0)
-    return tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 30.0 * tau**2 * (1.0 - tau) ** 2
-
-
-def run_out(tau: float) -> tuple[float, float]:
-    """r(τ) = τ - 6 τ³ + 8 τ⁴ - 3 τ⁵ and dr/dτ for τ in [0, 1]: from speed 1 to rest where it began, as smoothly."""
-    tau = min(max(tau, 0.0), 1.0)
-    return tau - tau**3 * (6.0 - 8.0 * tau + 3.0 * tau**2), 1.0 - tau**2 * (18.0 - 32.0 * tau + 15.0 * tau**2)

@@ -28,9 +28,70 @@ _BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep f
 PERIOD = 0.2  # [s] between two looks
 _LESS = 0.95  # an error that has shrunk to this share has shrunk
 _NOTHING = 1e-6  # [m or rad] errors below need not shrink
-_BEHIND = 100.0  # tolerances that an error with a moving reference may grow to
+BEHIND = 100.0  # tolerances that an error with a moving reference may grow to
 _AT_LIMIT = 1e-3  # [rad] from a position limit
-_MOVING = 0.01  # [rad/s] of joints that do not rest
+MOVING = 0.01  # [rad/s] of joints that do not rest
+
+# what a watch remembers: of every task the least error, the last one, looks in which it grew; and marks
+BEST, LAST, GROWN = range(3)
+IDLE, SAID, HELD, STALLED, COMPARED = range(5)
+#: What is said: nothing, that the robot is held, that it stands off its goals, that it falls behind them.
+NOTHING, IS_HELD, STANDS_OFF, FALLSBEHIND = range(4)
+TEXTS = (
+    "", "held: it moved without getting nearer to its goals", "stands off its goals", "falls behind its goals",
+)  # fmt: skip
+
+
+def judge(
+    errors: Any, off: Any, essential: Any, still: bool, restless: bool, bounds: tuple[int, float],
+    amounts: Any, marks: Any,
+) -> None:  # fmt: skip
+    """Judge a look that nothing explains; written once for Python and for compiled code.
+
+    Args:
+        errors: Norms of the tasks' errors.
+        off: Which tasks are essential and not met.
+        essential: Which tasks are essential.
+        still: Whether the references stand still.
+        restless: Whether nothing but tasks moves the robot, and it moves.
+        bounds: Looks without progress after which it is said, and errors that a task with a moving reference may have.
+        amounts: Rows `BEST`, `LAST`, `GROWN`, a column a task; changed.
+        marks: `IDLE`, looks without progress; `SAID`; `HELD`; `STALLED`; `COMPARED`, whether `LAST` is known; changed.
+    """
+    count, (patience, far) = len(errors), bounds
+    if not still:  # references that move
+        behind = False
+        for k in range(count):
+            known = marks[COMPARED] == 1
+            grown = known and essential[k] != 0 and errors[k] > amounts[LAST, k] and errors[k] > far
+            amounts[GROWN, k] = amounts[GROWN, k] + 1 if grown else 0
+            amounts[LAST, k] = errors[k]
+            behind = behind or amounts[GROWN, k] >= patience
+        marks[IDLE], marks[HELD], marks[STALLED], marks[COMPARED] = 0, 0, 0, 1
+        if not behind:
+            marks[SAID] = NOTHING
+        elif marks[SAID] == NOTHING:
+            marks[SAID] = FALLSBEHIND
+        return
+    anybody, less, less_off = False, False, False
+    for k in range(count):
+        if marks[IDLE] == 0:
+            amounts[BEST, k] = np.inf
+        fell = errors[k] < _LESS * amounts[BEST, k] and amounts[BEST, k] > _NOTHING
+        if fell:
+            amounts[BEST, k] = errors[k]
+        wrong = off[k] != 0
+        anybody, less, less_off = anybody or wrong, less or fell, less_off or (fell and wrong)
+    if less_off if anybody else less:  # others' errors do not excuse those that are off
+        marks[IDLE], marks[SAID], marks[HELD], marks[STALLED] = 0, NOTHING, 0, 0
+    marks[IDLE] += 1
+    if marks[IDLE] <= patience:
+        return
+    marks[STALLED] = 1 if anybody else 0
+    if restless and marks[HELD] == 0:
+        marks[HELD], marks[SAID] = 1, IS_HELD
+    elif anybody and marks[SAID] == NOTHING:
+        marks[SAID] = STANDS_OFF
 
 
 class StallWatch:
@@ -46,7 +107,8 @@ class StallWatch:
     def __init__(self, robot: Robot, dt: float, tolerance: float, patience: float) -> None:
         self.every = max(round(PERIOD / dt), 1)
         self._robot, self._tolerance = robot, tolerance
-        self._looks = max(int(np.ceil(patience / (self.every * dt))), 1)  # within the patience
+        #: Looks without progress after which it is said.
+        self.patience = max(int(np.ceil(patience / (self.every * dt))), 1)  # within the patience
         self.reset()
 
     def reset(self) -> None:
@@ -65,9 +127,7 @@ class StallWatch:
         #: Whether it stands off its goals.
         self.stalled = False
         self._seen: list[tuple[Any, Any]] = []  # values, and their offsets from the references
-        self._best, self._last = np.zeros(0), np.zeros(0)
-        self._idle = 0  # looks without progress
-        self._grown = np.zeros(0, dtype=int)  # looks in which a task's error grew
+        self._amounts, self._marks = np.zeros((3, len(self._tasks))), [0] * 5
 
     def watch(
         self, tick: int, tasks: Sequence[Task], law: Law, recovery: Recovery, state: RobotState,
@@ -130,39 +190,14 @@ class StallWatch:
             for sample, (value, offset) in zip(samples, self._seen, strict=True)
         )
         self._seen = [(value, sample.offset(value)) for value, sample in zip(values, samples, strict=True)]
-        if not still:
-            self._follow(tasks, found, errors, state)
-            return
-        if self._idle == 0:
-            self._best = np.full(len(tasks), np.inf)
-        less = (errors < _LESS * self._best) & (self._best > _NOTHING)
-        if (less & off).any() if any(off) else less.any():  # others' errors do not excuse those that are off
-            self._idle, self.messages, self.held, self.stalled = 0, (), False, False
-        self._best = np.where(less, errors, self._best)
-        self._idle += 1
-        if self._idle <= self._looks:
-            return
-        self.stalled = any(off)
-        if calm and not self.held and float(np.abs(qd).max()) > _MOVING:
-            self.held = True
-            self.messages = (self._text("held: it moved without getting nearer to its goals", tasks, found, state),)
-        elif self.stalled and not self.messages:
-            self.messages = (self._text("stands off its goals", tasks, found, state),)
-
-    def _follow(self, tasks: Sequence[Task], found: list[Any], errors: NDArray[np.float64], state: RobotState) -> None:
-        """References that move."""
-        self._idle, self.held, self.stalled = 0, False, False
-        if len(self._last) == len(errors):
-            essential = np.array([task.essential for task in tasks])
-            grown = essential & (errors > self._last) & (errors > _BEHIND * self._tolerance)
-            self._grown = np.where(grown, self._grown + 1, 0)
-        else:
-            self._grown = np.zeros(len(errors), dtype=int)
-        self._last = errors
-        if not (self._grown >= self._looks).any():
-            self.messages = ()
-        elif not self.messages:
-            self.messages = (self._text("falls behind its goals", tasks, found, state),)
+        restless = calm and float(np.abs(qd).max()) > MOVING
+        essential, far = [task.essential for task in tasks], BEHIND * self._tolerance
+        said = self._marks[SAID]
+        judge(errors, off, essential, still, restless, (self.patience, far), self._amounts, self._marks)
+        self.held, self.stalled = bool(self._marks[HELD]), bool(self._marks[STALLED])
+        if self._marks[SAID] != said:
+            said = self._marks[SAID]
+            self.messages = (self._text(TEXTS[said], tasks, found, state),) if said else ()
 
     def _text(self, what: str, tasks: Sequence[Task], found: list[Any], state: RobotState) -> str:
         amounts = []

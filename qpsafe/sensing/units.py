@@ -13,13 +13,48 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import types
 
+from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.sensing.spots import SpotArray
 
 #: Readings [m], and points from the world's origin [m], that nothing of their kind tells.
 FARTHEST_READING, FARTHEST_POINT = 10.0, 100.0
 #: For this long [s], looked at this many times.
 LASTING, LOOKS = 1.0, 5
+
+
+@inline
+def count_far(distances: Array, farthest: Array, counts: Array, noticed: Array) -> bool:
+    """Count the looks (k,) in which each spot's reading was too large for metres; whether one more was noticed (k,)."""
+    more = False
+    for k in range(distances.shape[0]):
+        if farthest[k] < distances[k] < np.inf:
+            counts[k] += 1
+        elif 0.0 <= distances[k] <= farthest[k]:
+            counts[k] = 0
+        if counts[k] >= LOOKS and not noticed[k]:
+            noticed[k] = more = True
+    return more
+
+
+@inline
+def all_far(points: Array) -> bool:
+    """Whether points (p, 3) all lie too far away to be metres."""
+    far = True
+    for k in range(points.shape[0]):
+        far = far and max(abs(points[k, 0]), abs(points[k, 1]), abs(points[k, 2])) > FARTHEST_POINT
+    return far
+
+
+@entry(types.boolean(readable(1), readable(1), types.int64[::1], types.boolean[::1]))
+def _count_far(distances: Array, farthest: Array, counts: Array, noticed: Array) -> bool:
+    return count_far(distances, farthest, counts, noticed)
+
+
+@entry(types.boolean(readable(2)))
+def _all_far(points: Array) -> bool:
+    return all_far(points)
 
 
 class UnitWatch:
@@ -36,8 +71,8 @@ class UnitWatch:
     def __init__(self, spots: SpotArray | None, dt: float) -> None:
         self._names = () if spots is None else spots.names
         ranges = np.zeros(0) if spots is None else np.asarray(spots.range_max, dtype=float)
-        self._farthest = np.maximum(FARTHEST_READING, 2.0 * ranges)
-        self._every = max(round(LASTING / LOOKS / dt), 1)
+        self.farthest = np.maximum(FARTHEST_READING, 2.0 * ranges)
+        self.every = max(round(LASTING / LOOKS / dt), 1)
         self.reset()
 
     def reset(self) -> None:
@@ -47,7 +82,7 @@ class UnitWatch:
         self._notes: tuple[str, ...] = ()
         self._counts = np.zeros(len(self._names), dtype=np.int64)
         self._noticed = np.zeros(len(self._names), dtype=np.bool_)
-        self._suspected, self._points = False, 0
+        self._points = 0
 
     #: A person has looked: what goes on will be noticed again.
     acknowledge = reset
@@ -55,7 +90,7 @@ class UnitWatch:
     def notes(self, distances: Any, points: Any) -> tuple[str, ...]:
         """What is odd, in words that change only when another spot joins; input as given to `step`, and accepted."""
         self._tick += 1
-        if self._tick % self._every == 0:
+        if self._tick % self.every == 0:
             given = distances if points is None else points
             array = np.asarray(given, dtype=float)
             if array.ndim == 1 and points is None:
@@ -65,26 +100,17 @@ class UnitWatch:
         return self._notes
 
     def _look_at_readings(self, distances: np.ndarray) -> None:
-        far = (distances > self._farthest) & (distances < np.inf)
-        if not (self._suspected or far.any()):  # the usual case
-            return
-        self._counts[far] += 1
-        self._counts[(distances >= 0.0) & (distances <= self._farthest)] = 0
-        self._suspected = bool(self._counts.any())
-        noticed = self._noticed | (self._counts >= LOOKS)
-        if (noticed != self._noticed).any():
-            self._noticed = noticed
+        if _count_far(distances, self.farthest, self._counts, self._noticed):
+            noticed = self._noticed
             self.odd = tuple(self._names[i] for i in noticed.nonzero()[0])
             who = ", ".join(self.odd)
             self._say(f"only readings beyond {FARTHEST_READING:g} m, which no such sensor tells: {who}")
 
     def _look_at_points(self, points: np.ndarray) -> None:
-        if len(points) and (np.abs(points).max(axis=1) > FARTHEST_POINT).all():
-            self._points += 1
+        if len(points):
+            self._points = self._points + 1 if _all_far(points) else 0
             if self._points == LOOKS:
                 self._say(f"all points beyond {FARTHEST_POINT:g} m from the origin")
-        elif len(points):
-            self._points = 0
 
     def _say(self, what: str) -> None:
         meant = "are these centimetres or millimetres? metres are wanted, +inf where nothing is in sight"

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
-from qpsafe.recovery.recovery import FOLLOWING, RECOVERING, SUSPENDED, Recovery, RecoveryRules, minimum_jerk, run_out
+from qpsafe.recovery.recovery import FOLLOWING, RECOVERING, SUSPENDED, Recovery, RecoveryRules
+from qpsafe.recovery.steps import minimum_jerk, run_out
 from qpsafe.tasks.joint import PostureTask
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask

@@ -1,0 +1,1 @@
+"""Many robots stepped in one call, each robot's whole tick compiled."""

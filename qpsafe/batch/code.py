@@ -1,0 +1,39 @@
+"""Numbers by which kernels find things in a batch's blocks, see `qpsafe.batch.blocks`."""
+
+from __future__ import annotations
+
+#: Joints, tasks, trajectories, spots, rows of all tasks, levels of danger, knots and events of all trajectories,
+#: floats of the robot's kinematics, links of its wire, floats and integers of the solver.
+(JOINTS, TASKS, PATHS, SPOTS, ROWS, LEVELS, KNOTS, EVENTS, MEMORY, LINKS, SOLVER, SOLVER_WHOLE) = range(12)
+HEADS = 12
+
+#: Numbers of the rules and the law.
+(DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,
+ WAY_DAMPING, WAY_DAMPING_TIME, WAY_GAIN, RETURN_SPEED) = range(17)  # fmt: skip
+#: Whole ones: whether paths are suspended at all, looks of the stall watch and ticks between two, ticks between two
+#: looks at units, how many spots may be out of order, rows of the largest level, of a way back through the joints too.
+ENABLED, PATIENCE, EVERY, UNITS_EVERY, MOST, LARGEST, LARGEST_WAY = range(7)
+#: Kinds of trajectories: one pose; at rest after its end; begun again at its end; known up to its end.
+FIXED, RESTS, CYCLES, ENDS = range(4)
+#: Floats of a knot of a trajectory: pose, twist, turn to the next knot and the turn's rate there.
+POSE, TWIST, TURN, TURN_RATE, KNOT = 0, 16, 22, 25, 28
+
+#: A robot's clock: time on the path, rate. A return: duration, time since its start.
+TIME, RATE = range(2)
+DURATION, SINCE = range(2)
+#: A robot's marks.
+(SEQ, ACTIVE, CHANGED, PAUSED, PHASE, STATUS, REASON, NOTES, WAITS, KEPT_LEVELS, LED, WAY, WAY_PHASE, WAY_CHANGED,
+ MET_KNOWN, COMPARED_VALUES, STOPPED, DYING, OUT, UNIT_TICKS, FAR_POINTS, ODD, CAPPED, COUNT) = range(24)  # fmt: skip
+#: Of a task, or of the way: whether it has to come back, is on its way, and whether its last offset is known.
+PENDING, RETURNING, KNOWN = range(3)
+#: What a tick came to.
+CDF_N, M, F = range(3)
+
+#: How a tick is told what is near: by readings of the spots, by points, by nothing (which is not silence).
+DISTANCES, POINTS, NOTHING = range(3)
+OK, DEGRADED, BAD_INPUT, FAULT = range(4)
+#: Why a robot brakes.
+(NO_REASON, NO_MEASUREMENT, NOTHING_GIVEN, NO_SPOTS, OUT_OF_ORDER, POINT_NOT_FINITE, DANGER_NOT_FINITE, LAW_ABSURD,
+ PATH_UNKNOWN) = range(9)  # fmt: skip
+#: What is unusual about a tick that goes on, in bits; what the stall watch says stands above them.
+LIMIT_GAVE_WAY, LAW_EXCEEDED, NOT_SOLVED, SENSORS_SICK, ODD_UNITS, STALL = 1, 2, 4, 8, 16, 32

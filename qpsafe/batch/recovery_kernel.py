@@ -1,0 +1,285 @@
+"""`Recovery` for tasks whose numbers are known: the same steps, with a robot's block for its memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from qpsafe.batch import code
+from qpsafe.batch.reference_kernel import error_norm, event_time, measure, sample_all
+from qpsafe.compiled.compiled import Array, inline
+from qpsafe.recovery import steps
+from qpsafe.recovery.steps import BACK, DUE, FINITE, FOLLOWING, GO_ON, HOLD, MET, RECOVERING, SUSPENDED
+from qpsafe.tasks.joint import TURN
+from qpsafe.tasks.offset import displace_into
+
+_length, _return_time, _fading = inline(steps.length), inline(steps.return_time), inline(steps.fading)
+_minimum_jerk, _run_out = inline(steps.minimum_jerk), inline(steps.run_out)
+START, SPEED_THEN, BEFORE = range(3)  # what is known of a task's offset
+
+
+@inline
+def copy(source: Array, target: Array) -> None:
+    """Copy a vector; a slice would make sure that they do not overlap."""
+    for j in range(source.shape[0]):
+        target[j] = source[j]
+
+
+@inline
+def not_met(p: Any, s: Any, w: Any, time: float, all_of_them: bool) -> int:
+    """Bits of the essential tasks, or of those that are active too, that are off the path."""
+    sample_all(p, w, time)
+    measure(p, w)
+    mask = 0
+    for k in range(p.gains.shape[0]):
+        asked = p.essential[k] == 1 and (all_of_them or s.activations[k] >= 1.0)
+        if asked and not error_norm(p, w.offsets[k], k) <= p.numbers[code.TOLERANCE]:
+            mask |= 1 << k
+    return mask
+
+
+@inline
+def _answer(question: int, of: Any, time: float) -> bool:
+    """See `qpsafe.recovery.steps`."""
+    p, s, w = of
+    if question == FINITE:  # has been looked at when the knots were made
+        return True
+    if question == DUE:
+        due = False
+        for path in range(p.kinds.shape[0]):
+            due = due or event_time(p, path, s.cursors[path]) <= time
+        return due
+    if question == MET:
+        return not_met(p, s, w, time, True) == 0
+    mask = 0
+    for k in range(p.gains.shape[0]):
+        if s.tasks[k, code.PENDING] == 1 and s.activations[k] >= 1.0:
+            mask |= 1 << k
+    s.marks[code.WAITS] = mask if mask != 0 else not_met(p, s, w, time, False)
+    return s.marks[code.WAITS] == 0
+
+
+@inline
+def _must_return(tasks: Array) -> None:
+    for k in range(tasks.shape[0]):
+        tasks[k, code.PENDING], tasks[k, code.RETURNING] = 1, 0
+
+
+@inline
+def lead(p: Any, s: Any) -> bool:
+    """Return through the joints, straight to where all tasks were last met; see `Recovery.lead`."""
+    if s.marks[code.PHASE] != RECOVERING or s.marks[code.LED] == 1 or p.whole[code.ENABLED] == 0:
+        return False
+    s.marks[code.LED] = s.marks[code.WAY] = s.marks[code.WAY_CHANGED] = 1
+    s.marks[code.WAY_PHASE] = FOLLOWING
+    s.way_marks[code.PENDING] = s.way_marks[code.RETURNING] = s.way_marks[code.KNOWN] = 0
+    copy(s.met, s.posture)
+    _must_return(s.tasks)
+    for k in range(s.tasks.shape[0]):
+        s.tasks[k, code.KNOWN] = 0
+    return True
+
+
+@inline
+def _any_pending(s: Any) -> bool:
+    pending = False
+    for k in range(s.tasks.shape[0]):
+        pending = pending or s.tasks[k, code.PENDING] == 1
+    return pending
+
+
+@inline
+def on_path(s: Any) -> bool:
+    """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
+    return s.marks[code.PHASE] == SUSPENDED or not _any_pending(s)
+
+
+@inline
+def _too_fast(of: Any) -> bool:
+    """Whether a rate (6,) of a task's offset is above the peak speed of a return; see `RecoveryRules.too_fast`."""
+    p, rate, task = of
+    first = p.ends[task - 1] if task > 0 else 0
+    moves, turns = p.rows[first] < 3, p.rows[p.ends[task] - 1] >= 3
+    linear, angular = _length(rate[0], rate[1], rate[2]), _length(rate[3], rate[4], rate[5])
+    return (moves and not linear <= p.numbers[code.SPEED]) or (turns and not angular <= p.numbers[code.ANGULAR_SPEED])
+
+
+@inline
+def _largest(vector: Array) -> float:
+    most = 0.0
+    for j in range(vector.shape[0]):
+        most = max(most, abs(vector[j]))
+    return most
+
+
+@inline
+def _too_fast_joints(of: Any) -> bool:
+    p, rate = of
+    return not _largest(rate) <= p.numbers[code.JOINT_SPEED]
+
+
+@inline
+def _rate_into(offset: Array, before: Array, known: int, dt: float, rate: Array) -> None:
+    for j in range(offset.shape[0]):
+        rate[j] = (offset[j] - before[j]) / dt if known == 1 else 0.0
+        before[j] = offset[j]
+
+
+@inline
+def _set_out(
+    back: Array, marks: Array, start: Array, speed: Array, offset: Array, rate: Array, duration: float
+) -> None:
+    back[code.DURATION], back[code.SINCE] = duration, 0.0
+    marks[code.RETURNING] = 1
+    copy(offset, start)
+    copy(rate, speed)
+
+
+@inline
+def _fade(back: Array, marks: Array, start: Array, speed: Array, offset: Array, rate: Array) -> bool:
+    """Offset and rate of a return at its time; False where it is over."""
+    if back[code.SINCE] >= back[code.DURATION]:
+        marks[code.RETURNING] = marks[code.PENDING] = 0
+        return False
+    share = back[code.SINCE] / back[code.DURATION]
+    (s, ds), (r, dr) = _minimum_jerk(share), _run_out(share)
+    a, b, c, d = _fading(s, ds, r, dr, back[code.DURATION])
+    for j in range(offset.shape[0]):
+        offset[j], rate[j] = a * start[j] + b * speed[j], c * start[j] + d * speed[j]
+    return True
+
+
+@inline
+def _hold(marks: Array, kept: float, rate: Array) -> None:
+    """Held, not pulled: its motion runs out."""
+    marks[code.RETURNING] = 0
+    for j in range(rate.shape[0]):
+        rate[j] = kept * rate[j]
+
+
+@inline
+def _reference(p: Any, s: Any, w: Any, k: int, active: bool, goal: Array, twist: Array) -> None:
+    """Displace the reference of a pending task that stands in `goal` and `twist`."""
+    rate, offset = w.drift[:6], w.shift[:6]
+    copy(w.offsets[k], offset)
+    start, speed, before = s.offsets[START, k], s.offsets[SPEED_THEN, k], s.offsets[BEFORE, k]
+    _rate_into(offset, before, s.tasks[k, code.KNOWN], p.numbers[code.DT], rate)
+    s.tasks[k, code.KNOWN] = 1
+    way = _way_on(s.tasks[k, code.RETURNING] == 1, active, (p, rate, k))
+    if way == HOLD:
+        _hold(s.tasks[k], p.numbers[code.KEPT], rate)
+    else:
+        if way == GO_ON:
+            s.returns[k, code.SINCE] += p.numbers[code.DT]
+        else:
+            shift = _length(offset[0], offset[1], offset[2]) / p.numbers[code.SPEED]
+            turn = _length(offset[3], offset[4], offset[5]) / p.numbers[code.ANGULAR_SPEED]
+            duration = _return_time(max(shift, turn), p.numbers[code.SHORTEST])
+            _set_out(s.returns[k], s.tasks[k], start, speed, offset, rate, duration)
+        if not _fade(s.returns[k], s.tasks[k], start, speed, offset, rate):
+            return
+    pose = w.goals[p.paths[k]]
+    displace_into(pose, twist, offset, rate, goal, twist)
+
+
+@inline
+def _answer_way(question: int, of: Any, time: float) -> bool:
+    under_way, fine, met = of
+    if question == MET:
+        return met
+    return question == FINITE or (question == BACK and not under_way and fine)
+
+
+_next_phase, _advance = (inline(step) for step in steps.phases_by(_answer))
+_next_phase_of_way = inline(steps.phases_by(_answer_way)[0])
+_way_on, _way_on_joints = inline(steps.ways_by(_too_fast)), inline(steps.ways_by(_too_fast_joints))
+
+
+@inline
+def update_way(p: Any, s: Any, w: Any, least: float) -> bool:
+    """One tick on the way back through the joints; False where it is over. Its reference: `shift`, `drift` (n,)."""
+    n = s.q.shape[0]
+    offset, rate = w.shift[:n], w.drift[:n]
+    square = 0.0
+    for j in range(n):
+        offset[j] = s.q[j] - s.posture[j]
+        if p.endless[j] == 1:
+            offset[j] -= TURN * np.rint(offset[j] / TURN)
+        square += offset[j] * offset[j]
+    active, met = least >= 1.0, np.sqrt(square) <= p.numbers[code.TOLERANCE]
+    of = (s.way_marks[code.PENDING] == 1 and active, met or not active, met)
+    phase, anew = _next_phase_of_way(s.marks[code.WAY_PHASE], s.marks[code.WAY_CHANGED] == 1, False, 0.0, of)
+    s.marks[code.WAY_CHANGED], s.marks[code.WAY_PHASE] = 0, phase
+    if anew:
+        s.way_marks[code.PENDING], s.way_marks[code.RETURNING] = 1, 0
+    if phase == FOLLOWING:
+        s.marks[code.WAY] = 0  # there: what is left is the way from a posture that met the tasks
+        return False
+    for j in range(n):
+        rate[j] = 0.0
+    if s.way_marks[code.PENDING] == 1:
+        start, speed, before = s.way_offsets[START], s.way_offsets[SPEED_THEN], s.way_offsets[BEFORE]
+        _rate_into(offset, before, s.way_marks[code.KNOWN], p.numbers[code.DT], rate)
+        s.way_marks[code.KNOWN] = 1
+        way = _way_on_joints(s.way_marks[code.RETURNING] == 1, active, (p, rate))
+        there = False
+        if way == HOLD:
+            _hold(s.way_marks, p.numbers[code.KEPT], rate)
+        else:
+            if way == GO_ON:
+                s.way[code.SINCE] += p.numbers[code.DT]
+            else:
+                duration = _return_time(_largest(offset) / p.numbers[code.JOINT_SPEED], p.numbers[code.SHORTEST])
+                _set_out(s.way, s.way_marks, start, speed, offset, rate, duration)
+            there = not _fade(s.way, s.way_marks, start, speed, offset, rate)
+        if there:
+            offset[:], rate[:] = 0.0, 0.0
+    else:
+        offset[:] = 0.0
+    return True
+
+
+@inline
+def update(p: Any, s: Any, w: Any, cdf_n: float, least: float, goals: Array, twists: Array) -> None:
+    """Advance one tick and give each task its reference, see `Recovery.update`; on the way back, `shift` and `drift`.
+
+    `poses` has the tasks' frames, `activations` theirs; `goals` (N, 4, 4) and `twists` (N, 6) are filled in.
+    """
+    of, before = (p, s, w), s.marks[code.PHASE]
+    danger = p.whole[code.ENABLED] == 1 and not cdf_n <= p.numbers[code.SUSPEND]
+    s.marks[code.WAITS] = 0
+    phase, anew = _next_phase(before, s.marks[code.CHANGED] == 1, danger, s.clock[code.TIME], of)
+    s.marks[code.CHANGED], s.marks[code.PHASE] = 0, phase
+    if anew:
+        s.clock[code.RATE] = 0.0
+        s.marks[code.WAY] = s.marks[code.LED] = 0
+        _must_return(s.tasks)
+    elif before == FOLLOWING and phase == FOLLOWING:
+        step, dt = p.numbers[code.STEP], p.numbers[code.DT]
+        time, rate, waits = _advance(
+            s.clock[code.TIME], s.clock[code.RATE], s.marks[code.PAUSED] == 1, step, dt, of
+        )  # fmt: skip
+        if waits:
+            s.marks[code.WAITS] = not_met(p, s, w, s.clock[code.TIME], True)
+        s.clock[code.TIME], s.clock[code.RATE] = time, rate
+    if s.marks[code.WAY] == 1 and phase != SUSPENDED and update_way(p, s, w, least):
+        return
+    sample_all(p, w, s.clock[code.TIME])
+    pending = _any_pending(s)
+    if pending:
+        measure(p, w)
+    share = s.clock[code.RATE] if phase == FOLLOWING else 0.0
+    if s.marks[code.WAITS] != 0 and not pending and share == 1.0:
+        share = 0.0  # a reference that moved on would keep the tasks from the event they wait at
+    for k in range(p.gains.shape[0]):
+        path = p.paths[k]
+        for a in range(4):
+            copy(w.goals[path, a], goals[k, a])
+        for c in range(6):
+            twists[k, c] = share * w.twists[path, c]
+        if phase == SUSPENDED:
+            copy(w.offsets[k], s.offsets[BEFORE, k])
+            s.tasks[k, code.KNOWN] = 1
+        elif s.tasks[k, code.PENDING] == 1:
+            _reference(p, s, w, k, s.activations[k] >= 1.0, goals[k], twists[k])
