@@ -102,7 +102,12 @@ class _Builder:
         self.first: Array = robot.pose(self.frame, self.q)  # gives the orientation of points without one
         if file.start is not None:
             self.q = self.joints(["start"], file.start)
+            here = self.pose_of(["start"], file.start)
             self.first = robot.pose(self.frame, self.q)
+            if file.points[self.chosen(file.start)].euler is not None:
+                self.first[:3, :3] = here[:3, :3]
+            self.first[:3, 3] = here[:3, 3]
+        self.pose: Array = self.first  # where the frame is: as the points say, the joints only come near it
 
     def program(self) -> Program:
         moves: list[Move] = []
@@ -117,16 +122,13 @@ class _Builder:
                         moves.append(Dwell(self.pose, segment.dwell))
                 else:
                     moves.append(self.move(k, segment))
+                    self.pose = moves[-1].sample(moves[-1].duration).pose
         if not moves:
             raise self.wrong(["segment"], "only events", "at least one move or dwell")
         try:
             return Program(moves, events, self.file.cycle, self.frame)
         except ConfigurationError as problem:
             raise self.wrong(["cycle"], self.file.cycle, f"an end at the start; {problem.expected}") from None
-
-    @property
-    def pose(self) -> Array:
-        return self.robot.pose(self.frame, self.q)
 
     def move(self, k: int, segment: Any) -> Move:
         if isinstance(segment, DwellSegment):

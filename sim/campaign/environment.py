@@ -27,8 +27,9 @@ from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.recording import DT, Recording, Servo
+from qpsafe.sim.campaign.recording import Recording
 from qpsafe.sim.campaign.senses import Senses
+from qpsafe.sim.campaign.servo import DT, Servo
 from qpsafe.tasks.rotation import log3
 
 if TYPE_CHECKING:

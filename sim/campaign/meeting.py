@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from qpsafe.sim.campaign.people import EncounterModel
-from qpsafe.sim.campaign.recording import DT
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.campaign.station import Station, station
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.opponents.registry import NOTHING, SPOTS
+from qpsafe.sim.campaign.servo import DT, Servo
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STATUSES = (OK, DEGRADED, BAD_INPUT, FAULT)
-DT = 0.004  # [s]
 _NOBODY = np.empty((0, 3))
 Observer = Callable[[int, Array, "Tick"], None]
 
@@ -50,42 +50,6 @@ class Recording(NamedTuple):
     path_time: Array
     status: NDArray[np.int64]
     points: list[Array]
-
-
-class Servo:
-    """The robot's joints: they follow a reference at once, or `lag` later as joints of second order do.
-
-    Args:
-        q: Where they start (n,) [rad].
-        lag: Delay between a reference and its use, in whole ticks [s]; 0 for perfect following.
-        omega: Natural frequency of the joints where there is a lag [rad/s]; critically damped.
-    """
-
-    def __init__(self, q: Array, lag: float = 0.0, omega: float = 100.0) -> None:
-        self.q, self.qd = q.copy(), np.zeros_like(q)
-        self._delay, self._omega = round(lag / DT), omega
-        self._waiting: list[tuple[Array, Array]] = []
-
-    def follow(self, q: Array, qd: Array) -> None:
-        """Move for one tick.
-
-        Args:
-            q: Position at the end of the tick (n,) [rad].
-            qd: Velocity (n,) [rad/s].
-        """
-        if self._delay == 0:
-            self.q, self.qd = q, qd
-            return
-        self._waiting.append((q, qd))
-        if len(self._waiting) <= self._delay:
-            return
-        goal, speed = self._waiting.pop(0)
-        # e'' = -2 ω e' - ω² e for e = q - q_ref, q_ref = goal - qd (DT - t): solved exactly over the tick
-        w, t = self._omega, DT
-        e, de = self.q - (goal - speed * DT), self.qd - speed
-        decay, c = np.exp(-w * t), de + w * e
-        self.q = goal + decay * (e + c * t)
-        self.qd = speed + decay * (c - w * (e + c * t))
 
 
 def record(

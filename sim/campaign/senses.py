@@ -38,12 +38,15 @@ class Senses:
     """
 
     def __init__(self, station: Station, tracks: PersonTracks, sensor: str, seed: int) -> None:
-        self._station, self._tracks = station, tracks
+        self._station, self.tracks = station, tracks
         spots = load_spots(station.robot)
         assert spots is not None  # a station without them is refused
         self.spots: SpotArray = spots
         reach = LOOK if sensor == "sharp" else None
-        self._reader = SpotReader(station.world, SpotTable.of(station.scene, spots, reach))
+        self.table = SpotTable.of(station.scene, spots, reach)
+        self._reader = SpotReader(station.world, self.table)
+        #: Whether readings are the true distances.
+        self.ideal = sensor != "sharp"
         robot = station.robot
         self._bodies = Bodies(station.world, robot)
         self._link_bodies = np.array([robot.mounting(end)[0] for _, end in robot.wire_frames])
@@ -55,7 +58,7 @@ class Senses:
     def distances(self, q: Array, k: int) -> Array:
         """What the spots read at tick k with the robot at q (n,) [rad]; (k,) [m]."""
         poses = self._station.robot.at(q).body_poses()
-        found, self._hits = self._reader.read(poses, self._tracks.row(k))
+        found, self._hits = self._reader.read(poses, self.tracks.row(k))
         self._true = found
         if self._sharp is None:
             return found
@@ -74,7 +77,7 @@ class Senses:
         it is the nearest one of this link's body, so that nobody counts once for every body of the robot.
         """
         state = self._station.robot.at(q)
-        near = self._bodies.to_people(state, self._tracks.row(k), SIGHT)
+        near = self._bodies.to_people(state, self.tracks.row(k), SIGHT)
         if not len(near.distance):
             return near.on_other
         links = nearest_link(near.on_other, state.wire(np.zeros_like(q)))

@@ -16,7 +16,7 @@ from qpsafe.sim.campaign.closest import closest
 from qpsafe.sim.campaign.contact import part_name
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
-from qpsafe.sim.campaign.recording import DT
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.campaign.trial import recorded
 from qpsafe.sim.drawing.film import Film
 from qpsafe.sim.world.scene import build_scene
@@ -35,6 +35,9 @@ def show(
     video: bool = True, progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Play a trial again: a table of its ticks, a video, and its row with every bit that it had in the campaign.
+
+    Video and table are of a run tick by tick; a campaign's own, where it is compiled as a whole, is the same within
+    1e-9 rad.
 
     Args:
         plan: The campaign.
@@ -63,7 +66,7 @@ def show(
     else:
         run = recorded(plan, met, controller, note)
     _write_table(out / f"{name}.csv", met, run, answers)
-    return measures(plan, met, controller, run)
+    return measures(plan, met, controller, recorded(plan, met, controller))
 
 
 def _filmed(plan: Plan, met: Meeting, controller: str, path: Path, note: Callable[..., None]) -> Recording:

@@ -31,6 +31,7 @@ from qpsafe.tasks.reach import joints_for
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 
 if TYPE_CHECKING:
+    from qpsafe.batch.pack import Packed
     from qpsafe.robot.robot import Robot
     from qpsafe.sensing.hulls import Obstacle
     from qpsafe.tasks.task import Task
@@ -74,6 +75,11 @@ class Station:
     def world(self) -> World:
         """The same as flat arrays for the engine."""
         return World.of(self.scene)
+
+    @cached_property
+    def packed(self) -> dict[str, Packed | None]:
+        """Controllers as blocks for compiled code, by their names; filled by `qpsafe.sim.campaign.play`."""
+        return {}
 
     @cached_property
     def distances(self) -> Distances:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import Case, Meeting, meeting
 from qpsafe.sim.campaign.opponents.registry import POINTS, SPOTS, opponent
+from qpsafe.sim.campaign.play import play
 from qpsafe.sim.campaign.recording import Observer, Recording, record
 from qpsafe.sim.campaign.senses import Senses
 
@@ -49,9 +50,11 @@ def recorded(plan: Plan, met: Meeting, name: str, observer: Observer | None = No
         plan: The campaign.
         met: The encounter.
         name: Of the controller.
-        observer: Called after every tick, see `record`.
+        observer: Called after every tick, see `record`; then nothing is compiled as a whole.
     """
     entry, senses = opponent(name), Senses(met.station, met.tracks, plan.sensor, met.seed)
     if plan.sensor == PERFECT_SIGHT and entry.sight == SPOTS:
         entry = entry._replace(sight=POINTS)
-    return record(met.station, entry, senses, len(met.tracks), plan.lag, observer)
+    ticks = len(met.tracks)
+    quick = play(met.station, entry, senses, ticks, plan.lag) if observer is None else None
+    return record(met.station, entry, senses, ticks, plan.lag, observer) if quick is None else quick

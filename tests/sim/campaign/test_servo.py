@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from qpsafe.sim.campaign.recording import DT, Servo
+from qpsafe.sim.campaign.servo import DT, OMEGA, Servo
 
 
 def references(ticks: int) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -28,8 +28,8 @@ def test_without_lag_the_robot_is_where_it_was_told() -> None:
 @pytest.mark.parametrize("delay", [1, 3])
 def test_with_lag_it_is_the_delayed_oscillator(delay: int) -> None:
     """Against numerical integration of q'' = ω² (r - q) + 2 ω (r' - q')."""
-    omega, start = 100.0, np.array([0.3, -0.2])
-    servo, told = Servo(start, lag=delay * DT, omega=omega), references(60)
+    omega, start = OMEGA, np.array([0.3, -0.2])
+    servo, told = Servo(start, lag=delay * DT), references(60)
     state = np.concatenate((start, np.zeros(2)))
     for k, (q, qd) in enumerate(told):
         servo.follow(q, qd)

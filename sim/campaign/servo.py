@@ -1,0 +1,81 @@
+"""The robot's joints in a trial: they follow a reference at once, or as joints of second order behind a delay."""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from qpsafe.compiled import compiled
+from qpsafe.compiled.compiled import entry, inline, readable
+
+Array = NDArray[np.float64]
+
+DT = 0.004  # of a trial's ticks [s]
+OMEGA = 100.0  # natural frequency of joints with a lag, critically damped; the plant's own [rad/s]
+
+
+@inline
+def follow(q: Array, qd: Array, goal: Array, speed: Array, omega: float, dt: float, after: Array, rate: Array) -> None:
+    """Joints a tick later, on their way to a reference that is at `goal` then and moves at `speed`; for compiled code.
+
+    q'' = ω² (r - q) + 2 ω (r' - q'), solved exactly over the tick.
+
+    Args:
+        q, qd: Now (n,).
+        goal, speed: Reference at the end of the tick (n,).
+        omega: ω [rad/s].
+        dt: Tick [s].
+        after, rate: Filled with q, q' at its end (n,).
+    """
+    decay = exp(-omega * dt)
+    for j in range(q.shape[0]):
+        e, de = q[j] - (goal[j] - speed[j] * dt), qd[j] - speed[j]
+        c = de + omega * e
+        after[j] = goal[j] + decay * (e + c * dt)
+        rate[j] = speed[j] + decay * (c - omega * (e + c * dt))
+
+
+_in, _out = readable(1), types.float64[::1]
+
+
+@entry(types.void(_in, _in, _in, _in, types.float64, types.float64, _out, _out), compiled)
+def _follow(
+    q: Array, qd: Array, goal: Array, speed: Array, omega: float, dt: float, after: Array, rate: Array
+) -> None:  # fmt: skip
+    follow(q, qd, goal, speed, omega, dt, after, rate)
+
+
+class Servo:
+    """The joints of one robot.
+
+    Args:
+        q: Where they start (n,) [rad].
+        lag: Delay between a reference and its use, in whole ticks [s]; 0 for perfect following.
+
+    Attributes:
+        q, qd: Where they are (n,) [rad, rad/s].
+    """
+
+    def __init__(self, q: Array, lag: float = 0.0) -> None:
+        self.q, self.qd = q.copy(), np.zeros_like(q)
+        self._delay = round(lag / DT)
+        self._waiting: list[tuple[Array, Array]] = []
+
+    def follow(self, q: Array, qd: Array) -> None:
+        """Move for one tick.
+
+        Args:
+            q: Reference at the end of the tick (n,) [rad].
+            qd: Its velocity (n,) [rad/s].
+        """
+        if self._delay == 0:
+            self.q, self.qd = q, qd
+            return
+        self._waiting.append((q, qd))
+        if len(self._waiting) > self._delay:
+            after, rate = np.empty_like(q), np.empty_like(q)
+            _follow(self.q, self.qd, *self._waiting.pop(0), OMEGA, DT, after, rate)
+            self.q, self.qd = after, rate
