@@ -12,8 +12,8 @@ from qpsafe.sim.campaign.opponents import registry
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 from qpsafe.sim.campaign.opponents.registry import names, opponent, register
 from qpsafe.sim.campaign.recording import Recording, record
-from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.campaign.senses import Senses
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.campaign.station import station
 from qpsafe.sim.engine.bodies import Bodies
 from qpsafe.sim.engine.tracks import PersonTracks

@@ -1,0 +1,34 @@
+"""The engine's trials against MuJoCo's rays, distances and dynamics, tick by tick."""
+
+import engine_against_mujoco as benchmark
+import pytest
+
+
+@pytest.mark.parametrize("trial", [0, 5])
+def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
+    """Where people are near: by contact without control in the second one."""
+    found = benchmark.compared(trial, ticks=1000)
+    assert found["compared"] == found["ticks"]
+    assert found["hits"] > 100
+    assert found["grazes"] == 0
+    assert found["signs"] == 0
+    assert found["readings"] < 1e-9
+    assert found["references"] < 1e-9
+    assert found["distances"] < 1e-8
+
+
+def test_dynamics_move_the_robot_a_little_otherwise() -> None:
+    found = benchmark.compared(0, dynamics=True, ticks=500)
+    assert 0.0 < found["joints"] < 0.05
+    assert found["contact"] == found["contact_there"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["default", "stop", "velocities"])
+def test_more_trials_are_the_same_in_mujoco(controller: str) -> None:
+    for trial in range(40, 52):
+        found = benchmark.compared(trial, controller=controller)
+        assert found["grazes"] <= 1e-3 * found["hits"]
+        assert found["readings"] < 1e-6
+        assert found["references"] < 1e-6
+        assert found["distances"] < 1e-6
