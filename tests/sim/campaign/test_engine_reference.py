@@ -7,7 +7,7 @@ import pytest
 @pytest.mark.parametrize("trial", [0, 5])
 def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
     """Where people are near: by contact without control in the second one."""
-    found = benchmark.compared(trial, ticks=1000)
+    found = benchmark.compared(trial, ticks=800)
     assert found["compared"] == found["ticks"]
     assert found["hits"] > 100
     assert found["grazes"] == 0
@@ -18,8 +18,8 @@ def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
 
 
 def test_dynamics_move_the_robot_a_little_otherwise() -> None:
-    found = benchmark.compared(0, dynamics=True, ticks=500)
-    assert 0.0 < found["joints"] < 0.05
+    found = benchmark.compared(0, dynamics=True, ticks=900)
+    assert 0.0 < found["joints"] < 0.1
     assert found["contact"] == found["contact_there"]
 
 
