@@ -14,7 +14,7 @@ from qpsafe.sim.people.walker import EASE
 Step = dict[str, Any]
 SHOULDER = 0.4  # height of the robot's shoulder above its base, in shares of the reach
 PHONE = (0.35, 0.7)  # where a phone is held: ahead [m], height in shares of the body's
-ROUTED = 0.6  # those who go round furniture take corners in this time [s]
+ROUTED = 1.0  # those who go round furniture take corners in this time [s]
 ROUND = 1.6  # ... and are no faster than this [m/s]
 SHORTEST = 0.2  # nobody stops in less [s]
 BACK = 0.8  # people walk backwards no faster than this [m/s]
@@ -67,7 +67,12 @@ class Visit:
         return self.plan.reach + self.draw.start + 0.5 * speed * (EASE[0] + EASE[1] * speed)
 
     def come(self, aside: float = 0.0, turned: float = 0.0) -> None:
-        """Stand where they set out, so far to the left of the line to the base axis, turned away from it [rad]."""
+        """Stand where they set out.
+
+        Args:
+            aside: So far to the left of the line to the base axis [m].
+            turned: Away from where the robot is [rad].
+        """
         self.start = self.at = self.plan.out(self.polar(self.far(), self.draw.azimuth, aside), self.draw.azimuth)
         self.first = self.heading = self.draw.azimuth + math.pi + turned
         if self.draw.delay > 0.0:
@@ -160,7 +165,7 @@ def reach(visit: Visit) -> None:
     draw, plan = visit.draw, visit.plan
     shoulder = (*plan.base, SHOULDER * plan.reach)
     x, y, z = (a + draw.along * (b - a) + d for a, b, d in zip(shoulder, plan.tool, draw.aside, strict=True))
-    visit.come()
+    visit.come((y - plan.base[1]) * -math.cos(draw.azimuth) + (x - plan.base[0]) * math.sin(draw.azimuth))
     place = (x + draw.near * math.cos(draw.azimuth), y + draw.near * math.sin(draw.azimuth))
     visit.walk(plan.out(place, draw.azimuth), draw.speed)
     here = visit.at

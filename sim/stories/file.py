@@ -7,9 +7,9 @@ heading = 180.0                   # deg; 0 looks along +x
 height = 1.75                     # m
 
 [[person.step]]
-do = "walk"                       # walk, wait, turn, reach, retract, carry, put_down or look
+do = "walk"                       # walk, wait, turn, reach, retract, stumble, carry, put_down or look
 to = [[1.5, 0.5], [0.9, 0.1]]     # m
-speed = 1.2                       # 0.5 to 2.0 m/s
+speed = 1.2                       # 0.5 to 2.5 m/s
 
 [[person.step]]
 do = "reach"

@@ -1,7 +1,8 @@
 """A story: who is where at any time, planned from data.
 
 The steps of a person follow one another. Walks and turns move the root, and footsteps follow it; reaching moves the
-hands while the root stands. Everything is a function of time alone, and the same file gives the same poses.
+hands, while the root stands unless it begins early. Everything is a function of time alone, and the same file gives the
+same poses.
 """
 
 from __future__ import annotations

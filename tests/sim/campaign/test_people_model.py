@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -290,6 +290,27 @@ def test_the_corners_of_the_cube_are_encounters_too(value: float) -> None:
         u = np.full(MODEL.dimensions, value)
         u[[MODEL.names.index(f"{who}.kind") for who in ("first", "second")]] = kind
         assert MODEL.encounter(u, TABLES).duration > 0.0
+
+
+@given(
+    unit=st.lists(st.floats(0.0, 1.0), min_size=MODEL.dimensions, max_size=MODEL.dimensions),
+    reach=st.floats(0.5, 1.8),
+    floor=st.floats(0.2, 1.2),
+    tool=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-0.2, 1.2)),
+    boxes=st.lists(
+        st.tuples(st.floats(-1.0, 1.0), st.floats(0.2, 1.2), st.floats(-1.0, 1.0), st.floats(0.2, 1.2)), max_size=3
+    ),
+)
+@settings(max_examples=25, deadline=None)
+def test_every_point_is_an_encounter_in_every_cell(unit, reach, floor, tool, boxes) -> None:
+    """Nothing is refused, nothing is infinite, and nobody walks through what stands there."""
+    obstacles = (PEDESTAL, *(Rectangle(x, x + a, y, y + b) for x, a, y, b in boxes))
+    story = MODEL.encounter(unit, FloorPlan(-floor, tool, reach, obstacles=obstacles))
+    times = np.arange(0.0, story.duration, 0.05)
+    assert np.isfinite(story.track(times).ends).all()
+    for actor in story.people:
+        x, y, _ = actor.course(times)
+        assert not any(((r.x0 < x) & (x < r.x1) & (r.y0 < y) & (y < r.y1)).any() for r in obstacles)
 
 
 def test_the_page_lists_every_number_with_its_source() -> None:
