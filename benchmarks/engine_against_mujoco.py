@@ -28,7 +28,7 @@ def compared(
     from qpsafe.sim.campaign.closest import closest
     from qpsafe.sim.campaign.meeting import meeting
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.reference import reference
+    from qpsafe.sim.campaign.in_mujoco import reference
     from qpsafe.sim.campaign.senses import Senses
     from qpsafe.sim.campaign.trial import recorded
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import qpsafe
-from qpsafe.sim.campaign.floor_plan import FloorPlan
 from qpsafe.sim.campaign.people import EncounterModel
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.drawing.stories import plan_figure
 from qpsafe.sim.experiments.fast_person import at_speed, fast_figure, runs
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment

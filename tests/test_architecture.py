@@ -36,6 +36,7 @@ sim.experiments.path
 sim.experiments.pick_place
 sim.replay
 sim.experiments sim.sick sim.placement
+sim.campaign.people
 sim.campaign
 sim.campaign.report
 sim.irc5

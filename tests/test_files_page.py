@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
-from qpsafe.sim.campaign.people_tables import PeopleTable
+from qpsafe.sim.campaign.people.tables import PeopleTable
 from qpsafe.sim.campaign.plan import PlanFile
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile

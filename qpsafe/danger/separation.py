@@ -67,5 +67,6 @@ class Separation:
     def speed(self, distance: ArrayLike) -> NDArray[np.float64]:
         """v_max for distances, any shape [m]; +inf where the distance is, 0 where it is not a number [m/s]."""
         b = self.deceleration * self.reaction_time + self.person_speed
-        room = np.nan_to_num(np.asarray(distance, dtype=float) - self.standing, nan=-1.0, posinf=np.inf)
-        return np.where(room > 0.0, np.sqrt(b * b + 2.0 * self.deceleration * np.maximum(room, 0.0)) - b, 0.0)
+        room = np.asarray(distance, dtype=float) - self.standing
+        room = np.where(room > 0.0, room, 0.0)  # false for NaN
+        return np.asarray(np.sqrt(b * b + 2.0 * self.deceleration * room) - b)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from qpsafe.sensing.detection import nearest_link
 from qpsafe.sensing.sharp import SharpConverter
-from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.engine.bodies import Bodies
 from qpsafe.sim.engine.spot_rays import SpotReader
 from qpsafe.sim.engine.spot_table import SpotTable
@@ -39,9 +38,7 @@ class Senses:
 
     def __init__(self, station: Station, tracks: PersonTracks, sensor: str, seed: int) -> None:
         self._station, self.tracks = station, tracks
-        spots = load_spots(station.robot)
-        assert spots is not None  # a station without them is refused
-        self.spots: SpotArray = spots
+        self.spots = spots = station.spots
         reach = LOOK if sensor == "sharp" else None
         self.table = SpotTable.of(station.scene, spots, reach)
         self._reader = SpotReader(station.world, self.table)

@@ -15,7 +15,8 @@ from qpsafe.controller import SafetyController
 from qpsafe.danger.thresholds import robot_activation
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
-from qpsafe.sim.campaign.floor_plan import FloorPlan
+from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.fixed.stage import robot_stage
@@ -75,6 +76,13 @@ class Station:
     def world(self) -> World:
         """The same as flat arrays for the engine."""
         return World.of(self.scene)
+
+    @cached_property
+    def spots(self) -> SpotArray:
+        """The robot's distance sensors."""
+        spots = load_spots(self.robot)
+        assert spots is not None  # a station without them is refused
+        return spots
 
     @cached_property
     def packed(self) -> dict[str, Packed | None]:
@@ -145,7 +153,11 @@ class Station:
             parts: More arguments of `SafetyController`.
         """
         count = len(self.robot.tool_frames)
-        given = {"known": self.known, "activation": robot_activation(self.robot, count, count), **parts}
+        given = {
+            "known": self.known,
+            "spots": self.spots,
+            "activation": robot_activation(self.robot, count, count),
+        } | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
     def nominal(self, ticks: int) -> float:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 TURNS = 0.02  # joint speed on both sides of zero that makes a change of direction a reversal [rad/s]
 STANDS = 1e-3  # a robot whose joints are all slower, and whose path waits, is stopped [rad/s]
-EVERY = 5  # ticks between two looks at the path error
+EVERY = 10  # ticks between two looks at the path error
 SETTLING = 0.3  # after a return to the path its error still runs out [s]
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.sim.campaign.floor_plan import BODY, PEDESTAL, ROUND, FloorPlan, Rectangle
+from qpsafe.sim.campaign.people.floor_plan import BODY, PEDESTAL, ROUND, FloorPlan, Rectangle
 from qpsafe.sim.experiments.pick_place.cell import Cell
 from qpsafe.sim.world.scene import build_scene
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.floor_plan import PEDESTAL, FloorPlan, Rectangle
 from qpsafe.sim.campaign.people import BUNDLED, EncounterModel
-from qpsafe.sim.campaign.people_file import PeopleFile
-from qpsafe.sim.campaign.people_tables import Spread, mixed
+from qpsafe.sim.campaign.people.file import PeopleFile
+from qpsafe.sim.campaign.people.floor_plan import PEDESTAL, FloorPlan, Rectangle
+from qpsafe.sim.campaign.people.tables import Spread, mixed
 from qpsafe.sim.people.person import SEGMENTS, Person
 from qpsafe.sim.stories.story import Story
 from qpsafe.text.toml_parse import toml_table
@@ -197,7 +197,7 @@ def test_people_begin_out_of_sight_and_come_soon() -> None:
 
 def test_hands_get_as_near_to_what_they_want_as_an_arm_can() -> None:
     """Near points are reached as they are; those out of reach on the way to them."""
-    from qpsafe.sim.campaign.within_reach import within_reach
+    from qpsafe.sim.campaign.people.within_reach import within_reach
 
     root = (0.9, 0.2, math.pi)
     assert within_reach(1.75, -0.55, root, (0.5, 0.1, 0.5), True) == pytest.approx((0.5, 0.1, 0.5), abs=1e-12)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.sim.campaign.floor_plan import FloorPlan
 from qpsafe.sim.campaign.people import EncounterModel
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.stories.file import load_story, parse_story
 from qpsafe.sim.stories.steps import BoardTable, PersonTable, StoryTable
 from qpsafe.sim.stories.write import story_text

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from qpsafe.sim.campaign.people_tables import PeopleTable
+from qpsafe.sim.campaign.people.tables import PeopleTable
 
 #: Coordinates of the encounter, then those of each of two people.
 SHARED = ("duration", "second")

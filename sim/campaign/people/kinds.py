@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from qpsafe.sim.campaign.floor_plan import FloorPlan, Place
-from qpsafe.sim.campaign.people_draws import Draw
-from qpsafe.sim.campaign.within_reach import within_reach
+from qpsafe.sim.campaign.people.draws import Draw
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan, Place
+from qpsafe.sim.campaign.people.within_reach import within_reach
 from qpsafe.sim.people.walker import EASE
 
 Step = dict[str, Any]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.floor_plan import FloorPlan
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.stories.file import load_story, parse_story
 from qpsafe.sim.stories.story import Story
 from qpsafe.text.toml_parse import read_bounded, toml_table

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.floor_plan import FloorPlan
-from qpsafe.sim.campaign.people_file import PeopleFile
-from qpsafe.sim.campaign.people_stories import PeopleStories
+from qpsafe.sim.campaign.people.file import PeopleFile
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
+from qpsafe.sim.campaign.people.stories import PeopleStories
 from qpsafe.sim.stories.story import Story
 
 Array = NDArray[np.float64]

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from qpsafe.sim.campaign.floor_plan import FloorPlan
-from qpsafe.sim.campaign.people_draws import CHOICES, NAMES, PERSON, SHARED, Draw, draw
-from qpsafe.sim.campaign.people_kinds import Visit
-from qpsafe.sim.campaign.people_tables import PeopleTable
+from qpsafe.sim.campaign.people.draws import CHOICES, NAMES, PERSON, SHARED, Draw, draw
+from qpsafe.sim.campaign.people.floor_plan import FloorPlan
+from qpsafe.sim.campaign.people.kinds import Visit
+from qpsafe.sim.campaign.people.tables import PeopleTable
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.sim.stories.story import Story
 from qpsafe.text.toml_text import TomlText
