@@ -33,7 +33,7 @@ RING = 6  # rays on the mantle of a cone, besides its axis
 RAYS = RING + 1
 _RINGS = np.array([(cos(2.0 * pi * i / RING), sin(2.0 * pi * i / RING)) for i in range(RING)])
 
-USES = (kinematics, spots, layout, ray_mesh, ray_shapes)
+USES = (compiled, kinematics, spots, layout, ray_mesh, ray_shapes)
 
 _ints, _rows = types.Array(types.int64, 1, "C", readonly=True), types.Array(types.int64, 2, "C", readonly=True)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
@@ -133,7 +133,7 @@ def _look_at(
         _three, _one, _two, _three, _two,
         types.float64[::1], types.float64[::1], types.int64[::1],
     ),
-    *USES, compiled,
+    *USES,
 )  # fmt: skip
 def read_spots(
     poses: Array,
