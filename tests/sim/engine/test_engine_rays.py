@@ -180,15 +180,6 @@ def test_the_order_of_shapes_does_not_matter(worlds):
     assert (hits != mixed).mean() < 0.1
 
 
-def test_what_has_no_place_in_the_world_is_refused_by_name():
-    def furnish(spec):
-        spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 1, 0.1], userdata=np.zeros(4))
-        spec.worldbody.add_geom(name="hills", type=1, hfieldname="hills")
-
-    with pytest.raises(ConfigurationError, match="hills"):
-        World.of(build_scene(qpsafe.load_robot("irb140"), furnish=furnish))
-
-
 def test_tracks_of_wrong_shape_are_refused(worlds):
     good = PersonTracks.of(worlds.PEOPLE, [[p.pose(1.0, 0.0, 0.0) for p in worlds.PEOPLE]] * 3, 0.004)
     assert good.ends.shape == (3, 34, 2, 3)
