@@ -98,8 +98,9 @@ def _faces_plane(o: Vector, a: Vector, sine: float, cosine: float, reach: float,
     """Whether a cone, cut off at `reach`, touches a plane from above."""
     height = _turned(T, shape, add(o, -1.0, place(T, shape[3], shape[7], shape[11])))[2]
     rise = _turned(T, shape, a)[2]
-    # the steepest ray of the cone falls by sin (α + the angle between axis and plane)
-    return 0.0 <= height <= reach * (sine * sqrt(max(1.0 - rise * rise, 0.0)) - rise * cosine) + 1e-9
+    # the steepest direction of the cone falls by sin (α + the angle between axis and plane), or straight down
+    fall = sine * sqrt(max(1.0 - rise * rise, 0.0)) - rise * cosine if rise > -cosine else 1.0
+    return 0.0 <= height <= reach * fall + 1e-9
 
 
 @inline
