@@ -127,11 +127,12 @@ def _core_distance(
     v = add(row(view(shape, CASE, (1, 3)), 0), -1.0, _out_of(T, row(view(others, CASE, (1, 3)), 0)))
     if not dot(v, v) > 0.0:
         v = (1.0, 0.0, 0.0)
-    count, vv, careful, apart, at, there = 0, inf, False, False, kind[VERTEX], other[VERTEX]
+    count, vv, size2, careful, apart, at, there = 0, inf, 0.0, False, False, kind[VERTEX], other[VERTEX]
     for _ in range(STEPS):
         n = (-v[0], -v[1], -v[2])
         a, b, at, there = _extremes(kind, shape, other, others, T, n, at, there, careful, vertices, starts, neighbours)
         w = add(a, -1.0, b)
+        size2 = max(size2, dot(w, w))
         done = False
         length, reached = sqrt(dot(v, v)), dot(v, w)
         if reached > limit * length:
@@ -160,7 +161,7 @@ def _core_distance(
                         count += 1
                 work[0], work[1], work[2] = p
                 work[3], work[4], work[5] = q
-                if vv <= 1e-30 * (dot(p, p) + dot(q, q)) and not apart:
+                if vv <= 1e-28 * size2 and not apart:  # the origin, but for rounding
                     return 0.0
                 continue
         if careful:
