@@ -7,17 +7,15 @@ measured, so that the order of shapes never matters.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf, isfinite, nan, sqrt
 
 import numpy as np
 from numba import types
 
-from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, linked, row
 from qpsafe.compiled.memory import view
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, place
-from qpsafe.sim.engine import layout
 from qpsafe.sim.engine import separation as separations
 from qpsafe.sim.engine.layout import BALL, BODY, BOX, CAPSULE, CASE, FLOATS, INTEGERS, KIND, MARGIN, PLANE, SIZE
 from qpsafe.sim.engine.separation import WORK, hull_types, separation
@@ -26,7 +24,7 @@ _separation = linked(separation, *separations.USES)
 _CAPSULE = np.array([CAPSULE] + [0] * (INTEGERS - 1), dtype=np.int64)  # what people are made of
 _BOX = np.array([BOX] + [0] * (INTEGERS - 1), dtype=np.int64)
 
-USES = (kinematics, layout, *separations.USES, separations)
+USES = (kinematics, *separations.USES, separations)
 PAIR = 43 + FLOATS + WORK  # numbers that one pair is measured in
 
 _ints, _pairs = types.Array(types.int64, 1, "C", readonly=True), types.Array(types.int64, 2, "C", readonly=True)
@@ -138,7 +136,7 @@ def nearest_pair(
         index, shapes, vertices, starts, neighbours, planes: The world, see `World.solid`.
         at_most: Larger distances are not looked for [m].
         work: At least PAIR + 3 g + m numbers, for g shapes.
-        found: Filled with the distance (+inf if none) and the nearest points on both, (7,) [m].
+        found: Filled with the distance (+inf if none, NaN if a pose is not finite) and the nearest points, (7,) [m].
     """
     count = pairs.shape[0]
     A, B, globes = view(work, 0, (12,)), view(work, 12, (12,)), view(work, PAIR, (index.shape[0], 3))
@@ -149,6 +147,9 @@ def nearest_pair(
     for p in range(count):
         i, j = pairs[p, 0], pairs[p, 1]
         c, r = row(globes, i), shapes[i, BALL + 3]
+        if not isfinite(dot(c, c)):
+            found[0] = nan
+            return -1
         if index[j, KIND] == PLANE:
             _pose_of(poses[index[j, BODY]], shapes[j], B)
             bound = B[2] * (c[0] - B[3]) + B[6] * (c[1] - B[7]) + B[10] * (c[2] - B[11]) - r
@@ -191,7 +192,7 @@ def nearest_pair(
         _three, _one, _two, _three, _two,
         types.float64, types.float64[::1], types.float64[::1],
     ),
-    *USES, compiled,
+    *USES,
 )  # fmt: skip
 def robot_to_people(
     poses: Array,
@@ -221,7 +222,7 @@ def robot_to_people(
         ends, radii, balls, boards, half_sizes: People, see `PersonTracks.row`; no boards measures bodies only.
         at_most: Larger distances are not looked for [m].
         work: At least PAIR + r (s + b) numbers.
-        found: Filled with the distance (+inf if none) and the nearest points on robot and people, (7,) [m].
+        found: Filled with the distance (+inf if none, NaN if a pose is not finite) and the nearest points, (7,) [m].
     """
     segments, people, other = radii.shape[0], balls.shape[0], radii.shape[0] + boards.shape[0]
     each = segments // people if people else 0
@@ -233,6 +234,9 @@ def robot_to_people(
     for g in range(robot.shape[0]):
         i = robot[g]
         c, r = _ball_of(poses[index[i, BODY]], shapes[i]), shapes[i, BALL + 3]
+        if not isfinite(dot(c, c)):
+            found[0] = nan
+            return -1, -1
         for p in range(people):
             away = add(c, -1.0, row(balls, p))
             far = sqrt(dot(away, away)) - balls[p, 3] - r > at_most

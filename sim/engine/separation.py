@@ -58,11 +58,23 @@ def _out_of(T: Array, p: Vector) -> Vector:
 
 
 @inline
+def _extremes(
+    kind: Index, shape: Array, other: Index, others: Array, T: Array, n: Vector, at: int, there: int, careful: bool,
+    vertices: Array, starts: Index, neighbours: Index,
+) -> tuple[Vector, Vector, int, int]:  # fmt: skip
+    """The points of the first core farthest along n and of the second one farthest against it; and their vertices."""
+    a, at = support(kind, shape, n, at, careful, vertices, starts, neighbours)
+    m = _into(T, (-n[0], -n[1], -n[2]))
+    b, there = support(other, others, m, there, careful, vertices, starts, neighbours)
+    return a, _out_of(T, b), at, there
+
+
+@inline
 def _depth(
     kind: Index, shape: Array, other: Index, others: Array, T: Array,
     vertices: Array, starts: Index, neighbours: Index, planes: Array, work: Array,
 ) -> float:  # fmt: skip
-    """The shortest of some shifts that part two cores; its direction in work[6:9].
+    """The shortest of some shifts that part two cores; the first one's farthest point and the direction in work.
 
     The second core must move along the unit vector n by h = max n·a - min n·b to be parted from the first one.
     """
@@ -87,12 +99,11 @@ def _depth(
             n = add(_out_of(T, row(planes, other[PLANES_FROM] + i - 14 - mine)), -1.0, (T[3], T[7], T[11]))
         if (i < 14 and i % 2 == 1) or i >= 14 + mine:
             n = (-n[0], -n[1], -n[2])
-        a, at = support(kind, shape, n, at, False, vertices, starts, neighbours)
-        m = _into(T, n)
-        b, there = support(other, others, (-m[0], -m[1], -m[2]), there, False, vertices, starts, neighbours)
-        shift = dot(n, a) - dot(n, _out_of(T, b))
+        a, b, at, there = _extremes(kind, shape, other, others, T, n, at, there, False, vertices, starts, neighbours)
+        shift = dot(n, add(a, -1.0, b))
         if shift < best:
             best = shift
+            work[0], work[1], work[2] = a
             work[6], work[7], work[8] = n
     return max(best, 0.0)
 
@@ -116,12 +127,12 @@ def _core_distance(
     v = add(row(view(shape, CASE, (1, 3)), 0), -1.0, _out_of(T, row(view(others, CASE, (1, 3)), 0)))
     if not dot(v, v) > 0.0:
         v = (1.0, 0.0, 0.0)
-    count, vv, careful, apart, at, there = 0, inf, False, False, kind[VERTEX], other[VERTEX]
+    count, vv, size2, careful, apart, at, there = 0, inf, 0.0, False, False, kind[VERTEX], other[VERTEX]
     for _ in range(STEPS):
-        a, at = support(kind, shape, (-v[0], -v[1], -v[2]), at, careful, vertices, starts, neighbours)
-        b, there = support(other, others, _into(T, v), there, careful, vertices, starts, neighbours)
-        b = _out_of(T, b)
+        n = (-v[0], -v[1], -v[2])
+        a, b, at, there = _extremes(kind, shape, other, others, T, n, at, there, careful, vertices, starts, neighbours)
         w = add(a, -1.0, b)
+        size2 = max(size2, dot(w, w))
         done = False
         length, reached = sqrt(dot(v, v)), dot(v, w)
         if reached > limit * length:
@@ -150,7 +161,7 @@ def _core_distance(
                         count += 1
                 work[0], work[1], work[2] = p
                 work[3], work[4], work[5] = q
-                if vv <= 1e-30 * (dot(p, p) + dot(q, q)) and not apart:
+                if vv <= 1e-28 * size2 and not apart:  # the origin, but for rounding
                     return 0.0
                 continue
         if careful:
@@ -202,8 +213,7 @@ def separation(
         n = (n[0] / length, n[1] / length, n[2] / length)
     else:
         gap = -_depth(kind, shape, other, others, T, vertices, starts, neighbours, planes, work)
-        n = (work[6], work[7], work[8])
-        a, _ = support(kind, shape, n, kind[VERTEX], True, vertices, starts, neighbours)
+        a, n = (work[0], work[1], work[2]), (work[6], work[7], work[8])
         b = add(a, gap, n)
     work[0], work[1], work[2] = add(a, shape[MARGIN], n)
     work[3], work[4], work[5] = add(b, -others[MARGIN], n)

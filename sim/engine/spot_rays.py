@@ -33,7 +33,7 @@ RING = 6  # rays on the mantle of a cone, besides its axis
 RAYS = RING + 1
 _RINGS = np.array([(cos(2.0 * pi * i / RING), sin(2.0 * pi * i / RING)) for i in range(RING)])
 
-USES = (kinematics, spots, layout, ray_mesh, ray_shapes)
+USES = (compiled, kinematics, spots, layout, ray_mesh, ray_shapes)
 
 _ints, _rows = types.Array(types.int64, 1, "C", readonly=True), types.Array(types.int64, 2, "C", readonly=True)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
@@ -98,8 +98,9 @@ def _faces_plane(o: Vector, a: Vector, sine: float, cosine: float, reach: float,
     """Whether a cone, cut off at `reach`, touches a plane from above."""
     height = _turned(T, shape, add(o, -1.0, place(T, shape[3], shape[7], shape[11])))[2]
     rise = _turned(T, shape, a)[2]
-    # the steepest ray of the cone falls by sin (α + the angle between axis and plane)
-    return 0.0 <= height <= reach * (sine * sqrt(max(1.0 - rise * rise, 0.0)) - rise * cosine) + 1e-9
+    # the steepest direction of the cone falls by sin (α + the angle between axis and plane), or straight down
+    fall = sine * sqrt(max(1.0 - rise * rise, 0.0)) - rise * cosine if rise > -cosine else 1.0
+    return 0.0 <= height <= reach * fall + 1e-9
 
 
 @inline
@@ -133,7 +134,7 @@ def _look_at(
         _three, _one, _two, _three, _two,
         types.float64[::1], types.float64[::1], types.int64[::1],
     ),
-    *USES, compiled,
+    *USES,
 )  # fmt: skip
 def read_spots(
     poses: Array,

@@ -9,6 +9,7 @@ import qpsafe
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.people.anatomy import Body
 from qpsafe.sim.people.person import Board, Person
+from qpsafe.sim.people.posture import Arm, Posture, Stoop
 from qpsafe.sim.world.scene import build_scene
 from qpsafe.sim.world.surroundings import SCENERY
 
@@ -25,9 +26,17 @@ def random_encounters(scene, count, seed, radii=(0.1, 1.6)):
         for person in scene.people:
             azimuth, radius = rng.uniform(-np.pi, np.pi), rng.uniform(*radii)
             facing = azimuth + np.pi + 0.5 * rng.normal()
-            poses.append(person.pose(radius * np.cos(azimuth), radius * np.sin(azimuth), facing))
+            posture = None if person.board else reaching(rng)
+            poses.append(person.pose(radius * np.cos(azimuth), radius * np.sin(azimuth), facing, posture=posture))
         scene.place_people(data, poses)
         yield data, robot.at(q), PersonTracks.of(scene.people, [poses], 0.004)
+
+
+def reaching(rng):
+    """Hands anywhere before the body, in reach or not, the back bent."""
+    left, right = rng.uniform((0.1, -0.6, 0.3), (0.9, 0.6, 1.8), (2, 3))
+    arms = Arm(goal=tuple(left.tolist())), Arm(goal=tuple(right.tolist()))
+    return Posture(arms=arms, stoop=Stoop(rng.uniform(0.0, 0.8), rng.uniform(0.0, 0.2)))
 
 
 def add_shapes(rng, count=6, spread=0.9, group=SCENERY):

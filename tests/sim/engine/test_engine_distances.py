@@ -196,6 +196,16 @@ def test_own_pairs_are_apart_at_home_and_not_joined(encounters):
     assert 0 < overlapping < 50
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_poses_that_are_not_finite_give_no_distance(encounters, bad):
+    distances, cases = encounters
+    poses, row = cases[0][0].copy(), cases[0][1].row(0)
+    poses[4, 1, 3] = bad
+    for found in all_of(distances, poses, row):
+        assert np.isnan(found.distance)
+        assert (found.shape, found.other) == (-1, -1)
+
+
 def test_nobody_is_infinitely_far_away(encounters):
     distances, cases = encounters
     found = distances.people(cases[0][0], PersonTracks.of((), [[]], 0.004).row(0))

@@ -25,21 +25,20 @@ def compare(worlds, name, count, seed=0):
     scene = build_scene(robot, people=worlds.PEOPLE, furnish=Cell(full=0).furnish)
     world, spots = World.of(scene), qpsafe.load_spots(robot)
     both, one, worst = 0, 0, 0.0
-    for reach in (None, 5.0):
+    for reach in (None, 0.3, 5.0):
         table = SpotTable.of(scene, spots, reach)
         reader = SpotReader(world, table)
         for data, state, tracks in worlds.random_encounters(scene, count, seed):
             found, _ = reader.read(state.body_poses(), tracks.row(0))
-            expected = by_mujoco(scene, data, state, spots, table)
+            expected = by_mujoco(scene, data, *spots.rays(state), table)
             hit, seen = np.isfinite(expected), np.isfinite(found)
             both, one = both + int((hit & seen).sum()), one + int((hit != seen).sum())
             worst = max(worst, float(np.abs(found[hit & seen] - expected[hit & seen]).max(initial=0.0)))
     return both, one, worst
 
 
-def by_mujoco(scene, data, state, spots, table):
+def by_mujoco(scene, data, origins, axes, table):
     """What the cones see by `cast`: the axis and six rays on the mantle."""
-    origins, axes = spots.rays(state)
     u = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.8, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(axes, u)
@@ -79,7 +78,7 @@ def test_what_can_move_is_seen_where_it_is(worlds):
             data.qpos[at : at + 3] = origin + rng.uniform(0.05, 0.7) * axis
             data.qpos[at + 3 : at + 7] = rng.normal(size=4)
         mujoco.mj_kinematics(scene.model, data)
-        expected = by_mujoco(scene, data, state, spots, SpotTable.of(scene, spots))
+        expected = by_mujoco(scene, data, *spots.rays(state), SpotTable.of(scene, spots))
         assert rays.distances(data, state) == pytest.approx(expected, abs=1e-9)
         seen += int((reader.read(fixed.poses(state), tracks.row(0))[0] > expected + 1e-9).sum())
     assert seen > 100
@@ -115,29 +114,49 @@ def test_rays_meet_every_kind_of_shape_as_mujocos_do(worlds):
     assert kinds == {0, 2, 3, 4, 5, 6, 7}
 
 
-def test_a_cone_reads_the_least_of_its_rays(worlds):
-    """What the ball, the box and the planes of a mesh pass over in a cone, no ray of it would have met."""
-    scene = worlds.scene_of_shapes(5)
-    world, table = World.of(scene), eyes(np.random.default_rng(5), 400, slant=0.2)
-    poses = scene.robot.at(scene.robot.home).body_poses()
-    cones, hits = SpotReader(world, table).read(poses, NOBODY.row(0))
+@pytest.mark.parametrize(("slant", "reach"), [(0.2, 3.0), (0.05, 0.5), (0.5, 0.4), (1.0, 1.0)])
+def test_a_cone_reads_the_least_of_its_rays(worlds, slant, reach):
+    """What balls and boxes pass over in a cone, none of its rays would have met."""
+    scene, count = worlds.scene_of_shapes(5), 1000
+    table = eyes(np.random.default_rng(5), count, slant)._replace(reaches=np.full(count, reach))
+    world, poses = World.of(scene), scene.robot.at(scene.robot.home).body_poses()
+    person = worlds.PEOPLE[0]
+    people = PersonTracks.of([person], [[person.pose(0.3, 0.0, 1.0)]], 0.004).row(0)
+    cones, hits = SpotReader(world, table).read(poses, people)
     axes = table.rays[:, :3, 1]
     u = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.8, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v, least = np.cross(axes, u), np.full(len(axes), np.inf)
+    v, least = np.cross(axes, u), np.full(count, np.inf)
     for i in range(-1, 6):
-        d = axes + (0.2 * (np.cos(np.pi / 3 * i) * u + np.sin(np.pi / 3 * i) * v) if i >= 0 else 0.0)
+        d = axes + (slant * (np.cos(np.pi / 3 * i) * u + np.sin(np.pi / 3 * i) * v) if i >= 0 else 0.0)
         rays = table.rays.copy()
         rays[:, :3, 1] = d / np.linalg.norm(d, axis=1, keepdims=True)
-        single, _ = SpotReader(world, table._replace(rays=rays, slants=np.zeros(400))).read(poses, NOBODY.row(0))
+        single, _ = SpotReader(world, table._replace(rays=rays, slants=np.zeros(count))).read(poses, people)
         least = np.minimum(least, single)
     assert (np.isfinite(cones) == np.isfinite(least)).all()
     seen = np.isfinite(cones)
+    assert seen.sum() > 100
     assert np.abs(cones[seen] - least[seen]).max() < 1e-12
     # and the shape that is named is met by the cone if it is the only one there is
-    for i in np.flatnonzero(hits >= 0)[:20]:
+    g = len(world.names)
+    assert (hits >= g).sum() > 10
+    for i in np.flatnonzero((hits >= 0) & (hits < g))[:20]:
         only = SpotReader(world.take([hits[i]]), table).read(poses, NOBODY.row(0))[0]
         assert only[i] == pytest.approx(cones[i], abs=1e-12)
+
+
+def test_a_cone_that_looks_straight_down_sees_a_floor_just_in_reach(worlds):
+    scene = worlds.scene_of_shapes(0, count=0)
+    rng, count = np.random.default_rng(3), 400
+    table = eyes(rng, count, slant=0.2)
+    table.rays[:, :3, 0] = rng.uniform((1.5, -2.0, 0.0), (3.0, 2.0, 0.0), (count, 3))
+    table.rays[:, 2, 0] = -scene.pedestal + 3.0 * rng.uniform(0.9, 1.01, count)
+    down = rng.normal(0.0, 0.15, (count, 3)) - np.array([0.0, 0.0, 1.0])
+    table.rays[:, :3, 1] = down / np.linalg.norm(down, axis=1, keepdims=True)
+    found, _ = SpotReader(World.of(scene), table).read(EVERYWHERE, NOBODY.row(0))
+    expected = by_mujoco(scene, scene.make_data(), table.rays[:, :3, 0], table.rays[:, :3, 1], table)
+    assert 100 < np.isfinite(expected).sum() < count
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
 def test_what_is_met_has_a_name(worlds):
@@ -178,15 +197,6 @@ def test_the_order_of_shapes_does_not_matter(worlds):
         alone = SpotReader(world.take([mixed[i]]), table).read(poses, NOBODY.row(0))[0]
         assert alone[i] == one[i]
     assert (hits != mixed).mean() < 0.1
-
-
-def test_what_has_no_place_in_the_world_is_refused_by_name():
-    def furnish(spec):
-        spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 1, 0.1], userdata=np.zeros(4))
-        spec.worldbody.add_geom(name="hills", type=1, hfieldname="hills")
-
-    with pytest.raises(ConfigurationError, match="hills"):
-        World.of(build_scene(qpsafe.load_robot("irb140"), furnish=furnish))
 
 
 def test_tracks_of_wrong_shape_are_refused(worlds):

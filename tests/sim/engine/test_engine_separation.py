@@ -243,6 +243,8 @@ def degenerate(first, second):
         ((layout.BOX, [1.0, 1.0, 1e-9], [0, 0, 1]), (layout.BOX, [1.0, 1.0, 1e-9], [0, 0, 1.25]), 0.25 - 2e-9),
         ((layout.CYLINDER, [1e-9, 1.0, 0], [0, 0, 1]), (layout.CAPSULE, [0.1, 1.0, 0], [0.5, 0, 1]), 0.4 - 1e-9),
         ((layout.CYLINDER, [0.2, 0.5, 0], [0, 0, 1]), (layout.CYLINDER, [0.2, 0.5, 0], [0, 0, 2.5]), 0.5),
+        ((layout.CYLINDER, [0.2, 0.5, 0], [0, 0, 1]), (layout.CYLINDER, [0.2, 0.5, 0], [0, 0, 1.5]), -0.4),
+        ((layout.CYLINDER, [0.25, 0.5, 0], [0, 0, 1]), (layout.BOX, [0.25, 0.25, 0.5], [0.25, 0, 1]), -0.25),
         ((layout.ELLIPSOID, [0.1, 10.0, 1e-3], [0, 0, 1]), (layout.SPHERE, [0.1, 0, 0], [0, 0, 2]), 0.9 - 1e-3),
         ((layout.SPHERE, [1e-9, 0, 0], [0, 0, 1]), (layout.BOX, [1e3, 1e3, 1e3], [0, 0, 1002]), 1.0 - 1e-9),
         ((layout.SPHERE, [0.1, 0, 0], [0, 0, 1]), (layout.PLANE, [0, 0, 1], [0, 0, 0.5]), 0.4),
