@@ -26,9 +26,9 @@ def compared(
 ) -> dict[str, Any]:
     """Differences in one trial; trials are those of a campaign whose first seed is 0."""
     from qpsafe.sim.campaign.closest import closest
+    from qpsafe.sim.campaign.in_mujoco import reference
     from qpsafe.sim.campaign.meeting import meeting
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.in_mujoco import reference
     from qpsafe.sim.campaign.senses import Senses
     from qpsafe.sim.campaign.trial import recorded
 
