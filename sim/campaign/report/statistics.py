@@ -184,15 +184,15 @@ class Bootstrap:
         units = [_unit(values[name]) for name, _ in means]
         columns = [np.rint(values[key[0]] / unit) for key, unit in zip(means, units, strict=True)]
         columns += [ranks.before for _, ranks in ranked]
-        products = np.stack(columns, axis=1) if columns else np.empty((trials, 0))
+        products = np.stack(columns) if columns else np.empty((0, trials))
         done = 0
         for weights in _weights(trials, resamples, seed):
-            rows = slice(done, done + len(weights))
-            sums = weights @ products
+            rows = slice(done, done + weights.shape[1])
+            sums = products @ weights
             for k, key in enumerate(means):
-                self.drawn[key][rows] = sums[:, k] * units[k] / trials
+                self.drawn[key][rows] = sums[k] * units[k] / trials
             for k, (key, ranks) in enumerate(ranked, start=len(means)):
-                self.drawn[key][rows] = ranks.quantiles(weights, sums[:, k])
+                self.drawn[key][rows] = ranks.quantiles(weights, sums[k])
             done = rows.stop
             if progress is not None:
                 progress(done)
@@ -253,24 +253,27 @@ class _Ranks:
         """Of resamples.
 
         Args:
-            weights: How often each trial is in each, (m, n).
+            weights: How often each trial is in each, (n, m).
             before: How many trials of each lie before the window, (m,).
         """
-        upto = np.cumsum(weights[:, self.order[self.window]], axis=1) + before[:, None]
-        found = self.rising[self.window][(upto >= self.need).argmax(axis=1)]
-        for k in np.flatnonzero((before >= self.need) | (upto[:, -1] < self.need)):  # next to never: all ranks
-            found[k] = self.rising[(np.cumsum(weights[k, self.order]) >= self.need).argmax()]
+        upto = np.cumsum(weights[self.order[self.window]], axis=0) + before
+        below = (upto < self.need).sum(axis=0)  # ranks of the window before the quantile's
+        outside = (before >= self.need) | (below == len(upto))
+        found = self.rising[self.window][np.where(outside, 0, below)]
+        for k in np.flatnonzero(outside):  # next to never: all ranks
+            found[k] = self.rising[(np.cumsum(weights[self.order, k]) < self.need).sum()]
         return found
 
 
 def _weights(trials: int, resamples: int, seed: int) -> Iterator[Array]:
-    """How often each trial is in each resample, (some resamples, trials), block by block."""
+    """How often each trial is in each resample, (trials, some resamples), block by block."""
     rng = np.random.default_rng(seed)
     size = max(_BLOCK // trials, 1)
     for first in range(0, resamples, size):
         count = min(size, resamples - first)
         drawn = rng.integers(trials, size=(count, trials)) + trials * np.arange(count)[:, None]
-        yield np.bincount(drawn.ravel(), minlength=count * trials).reshape(count, trials).astype(np.float64)
+        found = np.bincount(drawn.ravel(), minlength=count * trials).reshape(count, trials)
+        yield found.T.astype(np.float64, order="C")
 
 
 def _limits(drawn: Array) -> tuple[float, float]:

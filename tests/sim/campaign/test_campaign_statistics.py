@@ -115,11 +115,11 @@ def test_quantiles_of_many_trials_are_found_in_a_window_of_ranks_and_outside(qua
     expected = np.quantile(data[drawn], quantile, axis=1, method="inverted_cdf")
     ranks = _Ranks(data, quantile)
     assert ranks.window.stop - ranks.window.start < 600
-    weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float)
-    np.testing.assert_array_equal(ranks.quantiles(weights, weights @ ranks.before), expected)
-    lopsided = np.zeros((2, 5000))
-    lopsided[0, data.argmin()] = lopsided[1, data.argmax()] = 5000.0
-    assert ranks.quantiles(lopsided, lopsided @ ranks.before).tolist() == [data.min(), data.max()]
+    weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float).T
+    np.testing.assert_array_equal(ranks.quantiles(weights, ranks.before @ weights), expected)
+    lopsided = np.zeros((5000, 2))
+    lopsided[data.argmin(), 0] = lopsided[data.argmax(), 1] = 5000.0
+    assert ranks.quantiles(lopsided, ranks.before @ lopsided).tolist() == [data.min(), data.max()]
 
 
 def test_limits_agree_with_scipys_paired_percentile_bootstrap() -> None:
