@@ -20,6 +20,7 @@ from qpsafe.errors import ConfigurationError, MissingExtraError, QpsafeError
 Piece = TypeVar("Piece")
 Answer = TypeVar("Answer")
 
+_GUARD = "or a script without `if __name__ == '__main__':`, which every process runs again?"
 #: Pieces handed to an executor of somebody else and not yet back.
 IN_FLIGHT = 32
 
@@ -192,7 +193,9 @@ def answers(
                 elif not _is_death(died):
                     raise died
                 elif alone:
-                    raise WorkerDiedError(f"a process died twice of {piece} (out of memory?): {died}") from None
+                    raise WorkerDiedError(
+                        f"a process died twice of {piece} (out of memory? {_GUARD}): {died}"
+                    ) from None
                 else:
                     if not broken and notice is not None:
                         notice(f"a process died; what was handed out is done once more, one by one: {died}")

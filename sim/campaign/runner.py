@@ -27,6 +27,7 @@ TrialFunction = Callable[[Plan, int], Sequence[dict[str, Any]]]
 
 CHUNK = 4  # trials that are handed out together
 KEEP_EVERY = 30.0  # [s]; what a power cut may cost
+KEEP_MOST = 500  # trials in memory that are not yet in the folder
 
 
 class TrialError(QpsafeError):
@@ -119,7 +120,8 @@ def run_campaign(
                 count += len(part.columns["trial"]) // len(plan.controllers)
                 if progress is not None:
                     progress(count, plan.trials)
-                if store is not None and perf_counter() - kept >= keep_every:
+                full = CHUNK * len(parts) >= KEEP_MOST or perf_counter() - kept >= keep_every
+                if store is not None and full:
                     store.keep(parts)
                     parts.clear()
                     kept = perf_counter()

@@ -25,6 +25,7 @@ from qpsafe.cli.campaign.options import (
 )
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
+from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
@@ -128,11 +129,15 @@ def _kept(folder: Path | None, screen: Console) -> Iterator[None]:
     """Say how to go on, whatever ended it."""
     try:
         yield
+    except (ConfigurationError, MissingExtraError):
+        raise  # it has not begun
     except BaseException:
         if folder is None:
             screen.print("nothing is kept without --out", style="yellow")
         elif any(folder.glob("trials-*.parquet")):
-            screen.print(f"finished trials are kept in {folder}: the same command goes on there", style="yellow")
+            text = f"finished trials are kept in {folder}: the same command goes on there"
+            screen.print(text, style="yellow")
+            screen.print(f"to judge what there is: qpsafe campaign report {folder}", style="yellow")
         raise
 
 
@@ -152,7 +157,7 @@ def _report(results: Results, folder: Path | None, screen: Console, json: bool) 
     else:
         show_table(found, screen)
         if folder is not None:
-            screen.print(f"written to {folder}: report.html, report.json", soft_wrap=True)
+            screen.print(f"written to {folder}: report.html, report.json")
     if found["findings"]:
         raise typer.Exit(1)
 

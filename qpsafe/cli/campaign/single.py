@@ -61,7 +61,7 @@ def show(
         print_json(row)
     else:
         _show_row(row, screen)
-    screen.print(f"written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", soft_wrap=True)
+    screen.print(f"written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
 
 
 def _show_row(row: dict[str, Any], screen: Console) -> None:
@@ -69,14 +69,14 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
     from qpsafe.cli.sheet import Sheet
     from qpsafe.sim.campaign.rows import COLUMNS
 
-    sheet = Sheet("What came of it", ("", "value", "unit", "definition"), text=(0, 2, 3))
+    sheet = Sheet("What came of it", ("", "value", "unit"), text=(0, 2))
     for column in COLUMNS:
         value = row[column.name]
         if value == value and value != "":  # neither NaN nor empty
             shown = (
                 f"{value:.4g}" if column.kind is float else str(value).lower() if column.kind is bool else str(value)
             )
-            sheet.add_row(column.name, shown, column.unit.replace("1", ""), column.meaning)
+            sheet.add_row(column.name, shown, column.unit.replace("1", ""))
     screen.print(sheet)
 
 
@@ -155,4 +155,4 @@ def _show_cases(found: Found, file: Path, controller: str, options: str, screen:
         screen.print(sheet)
     screen.print(found.sentence)
     command = f"qpsafe campaign show {file}#0 --controller {controller} {options}".rstrip()
-    screen.print(f"to see the first one: {command}", soft_wrap=True)
+    screen.print(f"to see the first one: {command}")

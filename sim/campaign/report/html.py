@@ -67,17 +67,19 @@ p, ul { margin: .4rem 0 .8rem; max-width: 46rem; } .soft, small { color: var(--s
 .wide { overflow-x: auto; margin: .6rem 0; overflow-wrap: normal; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
 th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-thead th { white-space: nowrap; border-bottom: 2px solid #9aa3ac; }
+thead th { vertical-align: bottom; border-bottom: 2px solid #9aa3ac; }
 td.number { text-align: right; white-space: nowrap; } tbody th { white-space: nowrap; }
 td small { display: block; white-space: nowrap; }
-figure { margin: .8rem 0; } figure svg { width: 100%; max-width: 50rem; height: auto; display: block; }
+figure { margin: .8rem 0; overflow-x: auto; }
+figure svg { width: 100%; min-width: 30rem; max-width: 50rem; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: .85rem; max-width: 46rem; }
 code { font: .82rem ui-monospace, monospace; background: #f2f4f6; padding: .05rem .25rem; border-radius: 3px; }
 details { margin: .5rem 0; } summary { cursor: pointer; font-weight: 600; }
 .fault { border-left: 4px solid #c0392b; background: #fdf0ee; padding: .5rem .8rem; }
 .fine { border-left: 4px solid #2a8c3c; background: #f0f7f1; padding: .5rem .8rem; }
+@page { size: A4 landscape; margin: 12mm; }
 @media print { body { max-width: none; padding: 0; font-size: 9.5pt; } .wide { overflow: visible; }
-  table { font-size: 6.5pt; } th, td { padding: .1rem .25rem; } figure, tr { break-inside: avoid; }
+  table { font-size: 6pt; } th, td { padding: .1rem .25rem; } figure, tr { break-inside: avoid; }
   thead { display: table-header-group; } }
 """
 )

@@ -115,7 +115,8 @@ class Statistic(NamedTuple):
     def of(self, values: Array) -> float:
         """Its value for trials (n,)."""
         if self.quantile is None:
-            return float(np.mean(values))
+            unit = _unit(values)
+            return float(np.rint(values / unit).sum()) * unit / len(values)
         return float(np.quantile(values, self.quantile, method="inverted_cdf"))
 
 
@@ -180,16 +181,18 @@ class Bootstrap:
         means = [key for key in self.drawn if key[1].quantile is None]
         ranked = [(key, _Ranks(values[key[0]], key[1].quantile)) for key in self.drawn if key[1].quantile is not None]
         # one matrix product gives all means, and how many of a resample lie before each window of ranks
-        columns = [values[name] for name, _ in means] + [ranks.before for _, ranks in ranked]
-        products = np.stack(columns, axis=1) if columns else np.empty((trials, 0))
+        units = [_unit(values[name]) for name, _ in means]
+        columns = [np.rint(values[key[0]] / unit) for key, unit in zip(means, units, strict=True)]
+        columns += [ranks.before for _, ranks in ranked]
+        products = np.stack(columns) if columns else np.empty((0, trials))
         done = 0
         for weights in _weights(trials, resamples, seed):
-            rows = slice(done, done + len(weights))
-            sums = weights @ products
+            rows = slice(done, done + weights.shape[1])
+            sums = products @ weights
             for k, key in enumerate(means):
-                self.drawn[key][rows] = sums[:, k] / trials
+                self.drawn[key][rows] = sums[k] * units[k] / trials
             for k, (key, ranks) in enumerate(ranked, start=len(means)):
-                self.drawn[key][rows] = ranks.quantiles(weights, sums[:, k])
+                self.drawn[key][rows] = ranks.quantiles(weights, sums[k])
             done = rows.stop
             if progress is not None:
                 progress(done)
@@ -206,11 +209,21 @@ class Bootstrap:
             second: Name of another one.
             item: Statistic of both.
         """
-        a, b = self.drawn[first, item], self.drawn[second, item]
-        drawn = np.where(np.isclose(a, b, rtol=1e-12, atol=0.0), 0.0, a - b)  # sums of the same numbers may be rounded
+        drawn = self.drawn[first, item] - self.drawn[second, item]
         value = item.of(self.values[first]) - item.of(self.values[second])
         beside = min((drawn <= 0.0).sum(), (drawn >= 0.0).sum())
         return Estimate(value, *_limits(drawn), min(2.0 * (1.0 + float(beside)) / (1.0 + len(drawn)), 1.0))
+
+
+def _unit(column: Array) -> float:
+    """A power of two of which a column's values are taken as whole multiples.
+
+    So many bits are left to them that sums over a resample are whole numbers below 2^53: exact, hence the same in every
+    order of summation, by however many threads. A value of n is off by at most n/2^52 of the largest one.
+    """
+    largest = float(np.abs(column).max())
+    bits = 52 - int(np.ceil(np.log2(len(column))))
+    return 2.0 ** (int(np.ceil(np.log2(largest))) - bits) if largest > 1e-200 else 1.0
 
 
 class _Ranks:
@@ -240,24 +253,27 @@ class _Ranks:
         """Of resamples.
 
         Args:
-            weights: How often each trial is in each, (m, n).
+            weights: How often each trial is in each, (n, m).
             before: How many trials of each lie before the window, (m,).
         """
-        upto = np.cumsum(weights[:, self.order[self.window]], axis=1) + before[:, None]
-        found = self.rising[self.window][(upto >= self.need).argmax(axis=1)]
-        for k in np.flatnonzero((before >= self.need) | (upto[:, -1] < self.need)):  # next to never: all ranks
-            found[k] = self.rising[(np.cumsum(weights[k, self.order]) >= self.need).argmax()]
+        upto = np.cumsum(weights[self.order[self.window]], axis=0) + before
+        below = (upto < self.need).sum(axis=0)  # ranks of the window before the quantile's
+        outside = (before >= self.need) | (below == len(upto))
+        found = self.rising[self.window][np.where(outside, 0, below)]
+        for k in np.flatnonzero(outside):  # next to never: all ranks
+            found[k] = self.rising[(np.cumsum(weights[self.order, k]) < self.need).sum()]
         return found
 
 
 def _weights(trials: int, resamples: int, seed: int) -> Iterator[Array]:
-    """How often each trial is in each resample, (some resamples, trials), block by block."""
+    """How often each trial is in each resample, (trials, some resamples), block by block."""
     rng = np.random.default_rng(seed)
     size = max(_BLOCK // trials, 1)
     for first in range(0, resamples, size):
         count = min(size, resamples - first)
         drawn = rng.integers(trials, size=(count, trials)) + trials * np.arange(count)[:, None]
-        yield np.bincount(drawn.ravel(), minlength=count * trials).reshape(count, trials).astype(np.float64)
+        found = np.bincount(drawn.ravel(), minlength=count * trials).reshape(count, trials)
+        yield found.T.astype(np.float64, order="C")
 
 
 def _limits(drawn: Array) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -10,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,16 +16,13 @@ from typing import Any
 import made_up_trials
 import numpy as np
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
-from qpsafe.cli.campaign.run import _show_differences, show_table
 from qpsafe.cli.main import app
-from qpsafe.cli.sheet import Sheet
 from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
 from qpsafe.sim.campaign.report.page import show_command
-from qpsafe.sim.campaign.runner import run_campaign, stored_results
+from qpsafe.sim.campaign.runner import stored_results
 from qpsafe.sim.campaign.worst import Encounter, cases_to_dict, encounter_of, find_worst, load_case
 from qpsafe.text.json_text import json_text
 
@@ -173,27 +168,24 @@ def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(tmp_path: Pa
     refused = campaign(*FEW, "--out", "kept", "--lag", "0.01")
     assert isinstance(refused.exception, ConfigurationError)
     assert "kept: lag = 0.0: expected 0.01" in str(refused.exception)
+    assert "goes on" not in refused.output
     assert {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()} == before
 
 
-# Narrow screens
+def test_what_ends_it_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def failing(plan: Plan, trial: int) -> list[dict[str, Any]]:
+        return made_up_trials.run(plan, trial) if trial < 9 else [1 / 0]  # type: ignore[list-item]
 
-
-@pytest.mark.parametrize("width", [60, 80, 200])
-def test_tables_show_every_number_whole(width: int, whole: Callable[[Sheet, int], str]) -> None:
-    from qpsafe.sim.campaign.report.summary import summary
-
-    found = summary(run_campaign(Plan(trials=1000 // width), trial=made_up_trials.run))
-    sheets: list[Any] = []
-    screen = Console(file=io.StringIO(), width=width)
-    screen.print = sheets.append  # type: ignore[method-assign, assignment]
-    show_table(found, screen)
-    assert len(sheets) == 2
-    for sheet in sheets:
-        text = whole(sheet, width)
-        assert all(name in text for name in ("stop_perfect_sight", "nullspace"))
-    _show_differences(found | {"comparisons": []}, "stop", screen)  # nobody to compare with
-    assert len(sheets) == 2
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: failing)
+    result = campaign(*FEW, "--out", "kept")
+    assert "trial 9: ZeroDivisionError" in str(result.exception)
+    said = "finished trials are kept in kept: the same command goes on there"
+    assert said in " ".join(result.output.split())
+    assert "nothing is kept without --out" in campaign(*FEW, "--quick").output
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: made_up_trials.run)
+    assert json.loads(campaign("report", "kept", "--json").stdout)["trials"] == {"finished": 8, "planned": 12}
+    assert "It is not finished: 8 of 12 trials." in (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
+    assert "12 of 12" in campaign(*FEW, "--out", "kept").output
 
 
 # Stopped and killed

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import made_up_trials
 import numpy as np
 import pytest
 from rich.cells import cell_len
@@ -30,9 +31,13 @@ from qpsafe.cli import (
     story,
     stream_report,
 )
+from qpsafe.cli.campaign import run as campaign
+from qpsafe.cli.campaign import single
 from qpsafe.cli.demos import all_robots, fast_person, fixed, path, pick_and_place
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.search import Case, Found
 
 HOSTILE = "arm[/x] [red]b[/] :smile: [0m]"
 WIDTHS = (60, 80)
@@ -211,6 +216,26 @@ def of_stream(screen: Console, folder: Path) -> None:
     stream_report.show(result, screen)
 
 
+def of_campaign(screen: Console, folder: Path) -> None:
+    from qpsafe.sim.campaign.report.summary import summary
+    from qpsafe.sim.campaign.runner import run_campaign
+
+    found = summary(run_campaign(Plan(trials=30), trial=made_up_trials.run))
+    campaign.show_table(found | {"findings": [f"{HOSTILE} passes a joint limit"]}, screen)
+
+
+def of_trial(screen: Console, folder: Path) -> None:
+    for luck in (0.0, 1.0):  # with contact, and without
+        single._show_row(made_up_trials.row(Plan(), 29_999, "none", luck, True) | {"motion": HOSTILE}, screen)
+
+
+def of_worst(screen: Console, folder: Path) -> None:
+    row = made_up_trials.row(Plan(), 0, "none", 0.0, True)
+    case = Case((0.5,), row)
+    found = Found(2000, (case,) * 12, (case,), case, case, (case,) * 12)
+    single._show_cases(found, Path("out") / HOSTILE, "none", "--seed 123456", screen)
+
+
 def of_checks(screen: Console, folder: Path) -> None:
     of_fixed(screen, folder)
 
@@ -220,6 +245,10 @@ TABLES: dict[Callable[..., None], Show] = {
     bench.show: of_bench,
     bench.show_compilation: of_compilation,
     calibrate._show: of_calibration,
+    campaign.show_table: of_campaign,
+    campaign._show_differences: of_campaign,
+    single._show_row: of_trial,
+    single._show_cases: of_worst,
     common.show_checks: of_checks,
     compare._show: of_compare,
     fixed.show: of_fixed,

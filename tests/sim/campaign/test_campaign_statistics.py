@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.report.statistics import MEAN, MEDIAN, Bootstrap, Statistic, _Ranks, holm, mcnemar, share
+from qpsafe.sim.campaign.report.statistics import (
+    MEAN,
+    MEDIAN,
+    Bootstrap,
+    Statistic,
+    _Ranks,
+    _unit,
+    holm,
+    mcnemar,
+    share,
+)
 
 P10, P95 = Statistic(0.1), Statistic(0.95)
 ALL = (MEAN, MEDIAN, P10, P95)
@@ -105,11 +115,11 @@ def test_quantiles_of_many_trials_are_found_in_a_window_of_ranks_and_outside(qua
     expected = np.quantile(data[drawn], quantile, axis=1, method="inverted_cdf")
     ranks = _Ranks(data, quantile)
     assert ranks.window.stop - ranks.window.start < 600
-    weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float)
-    np.testing.assert_array_equal(ranks.quantiles(weights, weights @ ranks.before), expected)
-    lopsided = np.zeros((2, 5000))
-    lopsided[0, data.argmin()] = lopsided[1, data.argmax()] = 5000.0
-    assert ranks.quantiles(lopsided, lopsided @ ranks.before).tolist() == [data.min(), data.max()]
+    weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float).T
+    np.testing.assert_array_equal(ranks.quantiles(weights, ranks.before @ weights), expected)
+    lopsided = np.zeros((5000, 2))
+    lopsided[data.argmin(), 0] = lopsided[data.argmax(), 1] = 5000.0
+    assert ranks.quantiles(lopsided, ranks.before @ lopsided).tolist() == [data.min(), data.max()]
 
 
 def test_limits_agree_with_scipys_paired_percentile_bootstrap() -> None:
@@ -127,6 +137,23 @@ def test_limits_agree_with_scipys_paired_percentile_bootstrap() -> None:
     assert found.high == pytest.approx(theirs.high, abs=0.1 * spread)
     unpaired = found.high - found.low < 0.5 * 2 * 1.96 * np.sqrt((a.var() + b.var()) / 80)
     assert unpaired  # pairing takes out what the trials share
+
+
+def test_means_do_not_depend_on_the_order_of_summation() -> None:
+    """Nor, then, on how many threads multiply matrices: the report is the same byte for byte."""
+    rng = np.random.default_rng(8)
+    for trials in (1, 2, 7, 1000, 30_000):
+        for scale in (1e-12, 1.0, 3.7e5):
+            x = scale * rng.gamma(0.3, size=trials)
+            whole = np.rint(x / _unit(x))
+            weights = rng.multinomial(trials, np.full(trials, 1.0 / trials)).astype(float)
+            sums = {float(weights[order] @ whole[order]) for order in (rng.permutation(trials) for _ in range(20))}
+            assert len(sums) == 1
+            assert max(sums) < 2.0**53
+            assert sums.pop() * _unit(x) == pytest.approx(weights @ x, rel=1e-9)
+    for same in (0.0, 1e-310, 0.3, -7.1):  # nothing to estimate: limits that hold the value
+        value, low, high, _ = Bootstrap({"x": np.full(5, same)}, {"x": (MEAN,)}, 9).estimate("x", MEAN)
+        assert low == value == high == pytest.approx(same, rel=1e-12)
 
 
 @pytest.mark.parametrize("item", ALL, ids=str)
