@@ -29,8 +29,11 @@ MOTIONS = ("hold", "line", "pick")
 Sight = Literal["ideal", "sharp", "perfect"]
 SENSORS = get_args(Sight)
 #: Compared unless a plan says otherwise.
-CONTROLLERS = ("none", "stop", "stop_perfect_sight", "nullspace", "weighted", "strict", "paper", "default")
-FULL, QUICK = 30_000, 100
+CONTROLLERS = (
+    *("none", "stop", "stop_perfect_sight", "scaling", "nullspace", "weighted", "paper", "strict", "barrier"),
+    *("velocities", "default"),
+)
+FULL, QUICK = 3_000, 48
 LONGEST_LAG = 0.1  # [s]
 MOST_TRIALS = 10_000_000
 

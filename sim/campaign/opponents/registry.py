@@ -123,8 +123,8 @@ def opponent(name: str) -> Opponent:
     base = name.removesuffix(PERFECT)
     found = _imported(base) if ":" in base else _known.get(base)
     if found is None:
-        expected = ", ".join((*_known, "one of these + " + PERFECT, "or module:function"))
-        raise ConfigurationError("campaign", "controllers", name, "one of " + expected)
+        expected = f"one of {', '.join(_known)}, any of them with {PERFECT}, or module:function"
+        raise ConfigurationError("campaign", "controllers", name, expected)
     if base != name and found.sight == SPOTS:
         return found._replace(name=name, sentence=found.sentence + ", told where everybody is", sight=POINTS)
     return found

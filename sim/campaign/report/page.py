@@ -180,5 +180,5 @@ def _times(engine: dict[str, Any]) -> str:
     wall = "" if engine["wall_s"] is None else f", {engine['wall_s']:.0f} s from beginning to end"
     return (
         f"{engine['simulated_s']:,.0f} simulated seconds in {engine['processes_s']:,.0f} s of processes{wall}: "
-        f"{engine['simulated_s_per_wall_s']:.1f} simulated seconds a second and process."
+        f"{engine['all_controllers_s_per_process_s']:.1f} simulated seconds a second and process."
     )

@@ -31,7 +31,9 @@ METHODS = (
 )
 
 
-def summary(results: Results, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def summary(
+    results: Results, progress: Callable[[int, int], None] | None = None, speed: float | None = None
+) -> dict[str, Any]:
     """Everything that a report says, for JSON.
 
     Times stand under `engine` alone: all the rest is the same for the same rows.
@@ -39,6 +41,7 @@ def summary(results: Results, progress: Callable[[int, int], None] | None = None
     Args:
         results: With at least one finished trial.
         progress: Called with resamples done and wanted.
+        speed: Of the engine with the default controller, see `engine_speed`; None where it was not timed.
 
     Raises:
         ConfigurationError: No trial is finished.
@@ -56,7 +59,8 @@ def summary(results: Results, progress: Callable[[int, int], None] | None = None
         "references": [name for name in REFERENCES if name in rows],
         "worst": {name: worst(mine) for name, mine in rows.items()},
         "engine": {
-            "simulated_s_per_wall_s": results.speed,
+            "simulated_s_per_wall_s": speed,
+            "all_controllers_s_per_process_s": results.speed,
             "simulated_s": float(results.columns["simulated"].sum()),
             "processes_s": results.seconds,
             "wall_s": results.wall,

@@ -23,6 +23,7 @@ from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
 from qpsafe.sim.campaign.report.page import show_command
 from qpsafe.sim.campaign.runner import stored_results
+from qpsafe.sim.campaign.speed import Speed
 from qpsafe.sim.campaign.worst import Encounter, cases_to_dict, encounter_of, find_worst, load_case
 from qpsafe.text.json_text import json_text
 
@@ -33,6 +34,7 @@ FEW = ["--trials", "12", "--workers", "1", "--controllers", "none,stop,default"]
 def _made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Made-up trials in the place of simulated ones, and a current folder of its own."""
     monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: made_up_trials.run)
+    monkeypatch.setattr("qpsafe.sim.campaign.speed.engine_speed", lambda plan, trials: Speed(100.0, 90.0, float("nan")))
     monkeypatch.chdir(tmp_path)
 
 
@@ -140,7 +142,7 @@ def without_times(text: str) -> str:
         (["none.toml"], "none.toml: file = "),
         (["--trials", "0"], "--trials = 0"),
         (["--seed", "-1"], "--seed = -1"),
-        (["--controllers", "stop,brave"], "--controllers = 'brave': expected some of none, stop"),
+        (["--controllers", "stop,brave"], "--controllers = 'brave': expected one of none, stop"),
         (["--sensor", "radar"], "--sensor = 'radar'"),
         (["--motions", "hold,dance"], "--motions = 'dance'"),
         (["--lag", "3"], "--lag = 3.0"),
