@@ -153,11 +153,8 @@ class Station:
             parts: More arguments of `SafetyController`.
         """
         count = len(self.robot.tool_frames)
-        given = {
-            "known": self.known,
-            "spots": self.spots,
-            "activation": robot_activation(self.robot, count, count),
-        } | parts
+        given: dict[str, Any] = {"known": self.known, "spots": self.spots}
+        given |= {"activation": robot_activation(self.robot, count, count)} | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
     def nominal(self, ticks: int) -> float:
@@ -210,11 +207,12 @@ class Station:
                 wild = rng.normal(size=robot.nq) * robot.max_velocity
                 found.append((robot.home, 0.5 / _speeds(robot, robot.home, wild).max() * wild))
             return found
-        frame, q, found = robot.tool_frames[0], self.start, []
+        frame, found = robot.tool_frames[0], []
+        q: Array = self.start
         for t in np.arange(0.0, min(self.program.duration, 20.0), 0.1):
             sample = self.program.sample(float(t))
             q = joints_for(robot, frame, sample.pose, q)
-            qd: Array = np.linalg.lstsq(robot.jacobian(frame, q), sample.twist, rcond=None)[0]
+            qd = np.asarray(np.linalg.pinv(robot.jacobian(frame, q)) @ sample.twist, dtype=np.float64)
             if _speeds(robot, q, qd).max() > 0.1:
                 found.append((q, qd))
         return found
