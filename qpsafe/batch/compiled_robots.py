@@ -109,7 +109,7 @@ class CompiledRobots:
             path_time=floats[:, at.clock[code.TIME]].copy(),
             waits_for=marks[:, code.WAITS].copy(),
             errors=floats[:, at.errors],
-            events={int(r): self._events(r) for r in np.flatnonzero(happened.any(axis=1))},
+            events={int(r): self._events(int(r)) for r in np.flatnonzero(happened.any(axis=1))},
             words=words,
         )
 

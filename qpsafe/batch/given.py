@@ -50,9 +50,9 @@ def take(
         q, qd, distances, points, ages: As for `BatchController.step`.
     """
     starts, wrong = np.zeros(shape[0] + 1, dtype=np.int64), ""
-    joints = [np.full(shape, np.nan)] * 2
+    joints = np.full(shape, np.nan), np.full(shape, np.nan)
     try:
-        joints = [_shaped(name, value, shape) for name, value in (("q", q), ("qd", qd))]
+        joints = _shaped("q", q, shape), _shaped("qd", qd, shape)
         if distances is not None and points is not None:
             raise BadInput("both distances and points are given, expected one of them")
         if points is None and np.ndim(distances) == 3:  # type: ignore[arg-type]
