@@ -16,6 +16,8 @@ __version__ = "0.1.0"
 #: Public name -> module that defines it.
 _PUBLIC = {
     "Activation": "qpsafe.danger.activation",
+    "BatchController": "qpsafe.batch.controller",
+    "BatchTick": "qpsafe.batch.result",
     "Box": "qpsafe.limits",
     "ConfigurationError": "qpsafe.errors",
     "DangerBarrier": "qpsafe.laws.barrier",
@@ -68,6 +70,8 @@ _PUBLIC = {
 __all__ = ["__version__", *sorted(_PUBLIC)]
 
 if TYPE_CHECKING:
+    from qpsafe.batch.controller import BatchController as BatchController
+    from qpsafe.batch.result import BatchTick as BatchTick
     from qpsafe.controller import SafetyController as SafetyController
     from qpsafe.danger.activation import Activation as Activation
     from qpsafe.danger.activation import Threshold as Threshold

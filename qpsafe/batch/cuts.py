@@ -163,4 +163,4 @@ def lay_out(cut: Callable[..., Any], *sizes: Any) -> tuple[np.ndarray, int, int]
         whole = array.dtype == np.int8
         at[k] = length[whole]
         length[whole] += prod(array.shape)
-    return at[: len(arrays)], *length
+    return at[: len(arrays)], length[0], length[1]

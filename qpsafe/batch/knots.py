@@ -22,7 +22,7 @@ from qpsafe.tasks.trajectory import FixedPose, Sample
 Array = NDArray[np.float64]
 
 #: How far interpolation may be off: places and angles [m, rad], their rates [m/s, rad/s].
-POSE_TOLERANCE, TWIST_TOLERANCE = 1e-9, 1e-7
+POSE_TOLERANCE, TWIST_TOLERANCE = 1e-10, 1e-8
 _FINEST = 1024  # parts of a tick that knots may be apart
 _BETWEEN = (0.21, 0.5, 0.83)  # shares of the way between knots that are looked at
 _ENDING = (Line, Arc, Dwell, JointMoveOfFrame)  # at rest at their goal from `duration` on

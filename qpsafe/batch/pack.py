@@ -210,6 +210,18 @@ def new_state(packed: Packed, n: int) -> State:
     return state
 
 
+def own_of(packed: Packed, floats: Array, integers: Index) -> Own:
+    """Arrays of one robot, in its blocks.
+
+    Args:
+        packed: What it shares with the others.
+        floats: Its row of `State.floats`.
+        integers: Its row of `State.integers`.
+    """
+    head = packed.blocks[1]
+    return cuts.own(floats, integers, head[code.HEADS + blocks.SHARED :][: blocks.OWN], head)
+
+
 def reset(packed: Packed, state: State, which: Index) -> None:
     """Start robots anew, see `SafetyController.reset`.
 

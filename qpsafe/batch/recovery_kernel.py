@@ -258,7 +258,7 @@ def update(p: Any, s: Any, w: Any, cdf_n: float, least: float, goals: Array, twi
     elif before == FOLLOWING and phase == FOLLOWING:
         step, dt = p.numbers[code.STEP], p.numbers[code.DT]
         time, rate, waits = _advance(
-            s.clock[code.TIME], s.clock[code.RATE], s.marks[code.PAUSED] == 1, step, dt, of
+            s.clock[code.TIME], s.clock[code.RATE], s.marks[code.PAUSED] == 1, step, dt, p.event_times.shape[0] > 0, of
         )  # fmt: skip
         if waits:
             s.marks[code.WAITS] = not_met(p, s, w, s.clock[code.TIME], True)

@@ -22,10 +22,17 @@ class Row(NamedTuple):
         call: `call(k)` is the k-th call.
         collector: The garbage collector while timing: "off", as a 250 Hz loop would have it; "on"; or "frozen", on, but
             after `gc.freeze` it does not look at what was there before.
+        share: How many things of the kind that is timed a call does, such as ticks of so many robots; times are of one.
     """
 
     call: Callable[[int], Any]
     collector: str = "off"
+    share: int = 1
+
+    @property
+    def calls(self) -> int:
+        """Calls in a block."""
+        return max(BLOCK // self.share, 1)
 
 
 class Times(NamedTuple):
@@ -65,9 +72,9 @@ def time_rows(
         progress: Told after every round how many calls have been made since it was told last.
     """
     blocks = -(-runs // BLOCK)
-    taken = {name: np.empty((blocks, BLOCK)) for name in rows}
+    taken = {name: np.empty((blocks, row.calls)) for name, row in rows.items()}
     for row in rows.values():
-        for k in range(-warm_up, 0):
+        for k in range(-max(warm_up // row.share, 1), 0):
             row.call(k)
     gc.collect()
     try:
@@ -75,10 +82,10 @@ def time_rows(
             for name, row in rows.items():
                 _collect(row.collector)
                 times = taken[name][block]
-                for i in range(BLOCK):
+                for i in range(row.calls):
                     start = time.perf_counter()
-                    row.call(block * BLOCK + i)
-                    times[i] = time.perf_counter() - start
+                    row.call(block * row.calls + i)
+                    times[i] = (time.perf_counter() - start) / row.share
                 gc.unfreeze()
             if progress is not None:
                 progress(BLOCK * len(rows))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from qpsafe.batch.controller import BatchController
 from qpsafe.bench.clock import Row
 from qpsafe.controller import SafetyController
 from qpsafe.danger.field import DangerField
@@ -25,6 +26,8 @@ from qpsafe.tasks.trajectory import FixedPose
 
 #: What a robot with its own sensors runs; everything else is beside it.
 MAIN = "whole tick, 20 distances"
+#: Robots of a batch.
+ROBOTS = 1000
 
 
 def rows() -> dict[str, Row]:
@@ -38,6 +41,9 @@ def rows() -> dict[str, Row]:
         f"{MAIN}, paper's projection": Row(ticks(HierarchicalLaw("paper"))),
         f"{MAIN}, weighted law": Row(ticks(WeightedLaw())),
         f"{MAIN}, null-space law": Row(ticks(NullspaceLaw())),
+        "a robot of a batch of 1000, one core": Row(batch(1), share=ROBOTS),
+        "a robot of a batch of 1000, two cores": Row(batch(2), share=ROBOTS),
+        "a robot of a batch of 1000, nobody in sight, one core": Row(batch(1, np.inf), share=ROBOTS),
         "danger field, 20 points x 6 links": Row(danger_field()),
         "sensing, 20 spots, all filters": Row(sensing()),
     }
@@ -87,13 +93,10 @@ def ticks(law: Law, *, points: bool = False, task: type[PositionTask] = Position
         points: Give the detected points themselves: everything but what is done to raw sensor readings.
         task: Of the position.
     """
-    robot = load_robot("irb140")
-    target = FixedPose(robot.pose("tcp", robot.home))
-    controller = SafetyController(robot, [task("tcp", target), OrientationTask("tcp", target)], law)
+    controller = _controller(law, task)
     assert controller.spots is not None
-    offsets = np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))
-    sweep = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
-    distances, home = [d + offsets for d in sweep], robot.at(robot.home)
+    robot = controller.robot
+    distances, home = [d + _offsets(controller) for d in _SWEEP], robot.at(robot.home)
     given = [controller.spots.points(home, d) for d in distances] if points else distances
     state = [np.array(robot.home), np.zeros(6)]
 
@@ -106,3 +109,38 @@ def ticks(law: Law, *, points: bool = False, task: type[PositionTask] = Position
         state[:] = reference.q, reference.qd
 
     return tick
+
+
+def batch(threads: int, farther: float = 0.0) -> Callable[[int], Any]:
+    """`BatchController.step` of as many such robots, each at another place of the same sweep.
+
+    Args:
+        threads: Threads that share them.
+        farther: Added to all distances [m].
+    """
+    controller = _controller(HierarchicalLaw(), PositionTask)
+    robots, home = BatchController(controller, ROBOTS, threads), controller.robot.home
+    places = np.random.default_rng(2).integers(0, len(_SWEEP), ROBOTS)
+    offsets = _offsets(controller) + farther
+    state = [np.tile(home, (ROBOTS, 1)), np.zeros((ROBOTS, len(home)))]
+
+    def tick(k: int) -> None:
+        told = robots.step(state[0], state[1], _SWEEP[(places + k) % len(_SWEEP)][:, None] + offsets)
+        state[:] = told.q, told.qd
+
+    return tick
+
+
+_SWEEP = 0.54 + 0.22 * np.cos(2.0 * np.pi * np.arange(2500) / 2500.0)
+
+
+def _controller(law: Law, task: type[PositionTask]) -> SafetyController:
+    robot = load_robot("irb140")
+    target = FixedPose(robot.pose("tcp", robot.home))
+    return SafetyController(robot, [task("tcp", target), OrientationTask("tcp", target)], law)
+
+
+def _offsets(controller: SafetyController) -> np.ndarray:
+    """Of the spots' readings."""
+    assert controller.spots is not None
+    return np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))

@@ -49,12 +49,12 @@ def multiply(switches: Any, counts: Any, activations: Any) -> Any:
         counts: How many tasks each of them switches.
         activations: One a task.
     """
-    product, first = 1.0, 0
-    for k in range(len(counts)):
+    product, task = 1.0, 0
+    for k, count in enumerate(counts):
         product *= switches[k]
-        for task in range(first, first + counts[k]):
+        for _ in range(count):
             activations[task] = product
-        first += counts[k]
+            task += 1
     return activations
 
 
@@ -178,9 +178,15 @@ class Activation(Fixed):
             return Switching(self.switches(cdf_n), found, self.regime(cdf_n))
         if cdf_n <= self.levels[-1].start:  # below the lowest threshold
             return self._calm
-        switches = tuple([threshold(cdf_n) for threshold in self.levels])
+        switches, kept = [], 0
+        for threshold in self.levels:
+            if cdf_n <= threshold.start:
+                switches.append(1.0)
+                kept += 1
+            else:
+                switches.append(threshold(cdf_n))
         activations = multiply(switches, self.counts, [1.0] * len(self.thresholds))
-        return Switching(switches, tuple(activations), self.regime(cdf_n))
+        return Switching(tuple(switches), tuple(activations), self._names[kept])
 
     def kept(self, cdf_n: float) -> int:
         """Number of tasks not yet being released: N in low danger, 0 in high danger."""

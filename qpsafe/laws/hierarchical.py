@@ -128,20 +128,15 @@ def weigh(activations: Any, weights: Any) -> Any:
         activations: (tasks,), a sequence or an array.
         weights: (tasks + 1,), a list or an array.
     """
-    above = 1.0
-    for k in range(len(activations)):
-        weights[k] = above - activations[k]
-        above = activations[k]
-    weights[len(activations)] = above
+    above, k = 1.0, 0
+    for a in activations:
+        weights[k] = above - a
+        above, k = a, k + 1
+    weights[k] = above
     return weights
 
 
 weigh_compiled = inline(weigh)
-
-
-def weights_of(activations: Sequence[float]) -> list[float]:
-    """`regime_weights` as a list."""
-    return weigh(activations, [0.0] * (len(activations) + 1))
 
 
 class BlendResult(LawResult):

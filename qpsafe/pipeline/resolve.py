@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from qpsafe.hqp.own.regimes import MOST_LAYOUTS, layout_for
 from qpsafe.hqp.solution import SOLVED
-from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weights_of
+from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weigh
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
@@ -154,8 +154,7 @@ class Resolve:
             self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
         ours = self._ours and limits is not None and not soft
-        self._weights[:] = weights = weights_of(activations)
-        self._qd0[:] = qd0
+        self._qd0[:], weights = qd0, weigh(activations, self._weights).tolist()
         law = self.parts[1]
         damping = (law.damping, law.damping_time) if ours else (np.nan, np.nan)  # type: ignore[attr-defined]
         excess, worst = resolve_tick(

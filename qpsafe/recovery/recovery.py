@@ -32,7 +32,19 @@ _Of = tuple["Recovery", "RobotState", tuple[float, ...]]
 
 
 def _answer(question: int, of: _Of, time: float) -> bool:
-    return of[0].answer(question, of, time)
+    """Answer what the steps ask, see `qpsafe.recovery.steps`, of a recovery, its state and its activations."""
+    own, state, activations = of
+    if question == steps.DUE:
+        return any([cursor.due(time) for cursor in own._cursors])  # noqa: C419  a generator takes longer to make
+    if question == MET:
+        return not own._not_met(state, (1.0,) * len(own.tasks))
+    if question == FINITE:
+        for task in own.tasks:
+            if not task.trajectory.sample(own.path_time).finite:  # stay suspended, try again at the next tick
+                raise ValueError(f"the trajectory of the {task.name} task is not finite")
+        return True
+    own.waits_for = own._not_back(activations) or own._not_met(state, activations)
+    return not own.waits_for
 
 
 def _too_fast(of: tuple[RecoveryRules, NDArray[np.float64], bool, Sequence[int]]) -> bool:
@@ -63,9 +75,9 @@ class Recovery:
     ) -> None:
         self._dt = dt
         self._rules = RecoveryRules() if rules is None else rules
-        self.phase = FOLLOWING
-        #: What is left of the speed of a held task, from tick to tick.
-        self.kept = math.exp(-dt / self.rules.fade)
+        self._enter(steps.FOLLOWING)
+        self._step = dt / self.rules.ramp  # of the clock's rate, from tick to tick
+        self._kept = math.exp(-dt / self.rules.fade)
         self.path_time = 0.0
         self.paused = False
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
@@ -116,6 +128,11 @@ class Recovery:
         return self._rules
 
     @property
+    def kept(self) -> float:
+        """What is left of the speed of a held task, from tick to tick."""
+        return self._kept
+
+    @property
     def way(self) -> Recovery | None:
         """The way back through the joints, while it is taken."""
         return self._way
@@ -124,12 +141,13 @@ class Recovery:
     def clocks(self) -> tuple:
         """Phase, times on the path and on the returns; set them back when the robot could not go along."""
         way = None if self._way is None else self._way.clocks
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self.phase, way
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self._code, way
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
         self.path_time, self._rate = clocks[:2]
-        self._returns, self._pending, self.phase = list(clocks[2]), list(clocks[3]), clocks[4]
+        self._returns, self._pending = list(clocks[2]), list(clocks[3])
+        self._enter(clocks[4])
         self._due = None
         if self._way is not None and clocks[5] is not None:
             self._way.clocks = clocks[5]
@@ -148,7 +166,20 @@ class Recovery:
         Raises:
             ValueError: A trajectory is not finite; the phase stays as it was.
         """
-        self._next_phase(cdf_n, (self, state, activations))
+        self.waits_for = ()
+        before, of = self._code, (self, state, activations)
+        danger = not cdf_n <= self.suspend_above and self._rules.enabled
+        phase, anew = _next_phase(before, self._changed, danger, self.path_time, of)
+        self._changed = False
+        if phase != before:
+            self._enter(phase)
+        if anew:
+            self._suspend()
+        elif before == phase == steps.FOLLOWING:
+            clock = self.path_time, self._rate, self.paused, self._step, self._dt, len(self._cursors) > 0
+            self.path_time, self._rate, waits = _advance(*clock, of)
+            if waits:
+                self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
             samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
             # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
@@ -189,40 +220,8 @@ class Recovery:
                 cursor.count = count
         self._due = None
 
-    def _next_phase(self, cdf_n: float, of: _Of) -> None:
-        self.waits_for = ()
-        before = PHASES.index(self.phase)
-        danger = not cdf_n <= self.suspend_above and self.rules.enabled
-        phase, anew = _next_phase(before, self._changed, danger, self.path_time, of)
-        self._changed, self.phase = False, PHASES[phase]
-        if anew:
-            self._suspend()
-        elif before == phase == steps.FOLLOWING:
-            clock = self.path_time, self._rate, self.paused, self._dt / self._rules.ramp, self._dt
-            self.path_time, self._rate, waits = _advance(*clock, of)
-            if waits:
-                self.waits_for = self._not_met(of[1], (1.0,) * len(self.tasks))
-
-    def answer(self, question: int, of: _Of, time: float) -> bool:
-        """Answer what the steps of the state machine ask, see `qpsafe.recovery.steps`.
-
-        Args:
-            question: Its code.
-            of: Itself, the commanded configuration, the activations.
-            time: On the path [s].
-        """
-        _, state, activations = of
-        if question == steps.DUE:
-            return any(cursor.due(time) for cursor in self._cursors)
-        if question == MET:
-            return not self._not_met(state, (1.0,) * len(self.tasks))
-        if question == FINITE:
-            for task in self.tasks:
-                if not task.trajectory.sample(self.path_time).finite:  # stay suspended, try again at the next tick
-                    raise ValueError(f"the trajectory of the {task.name} task is not finite")
-            return True
-        self.waits_for = self._not_back(activations) or self._not_met(state, activations)
-        return not self.waits_for
+    def _enter(self, code: int) -> None:
+        self._code, self.phase = code, PHASES[code]
 
     def lead(self, posture: NDArray[np.float64]) -> bool:
         """Return through the joints, straight to a posture (n,) [rad], and from there to the path.
@@ -265,8 +264,8 @@ class Recovery:
         way = _way_on(back is not None, active >= 1.0, (self.rules, rate, joints, getattr(task, "rows", range(6))))
         if way == HOLD:
             self._returns[k] = None  # held, not pulled: its motion runs out
-            return sample.displaced(offset, self.kept * rate)
-        if way == SET_OUT:
+            return sample.displaced(offset, self._kept * rate)
+        if back is None or way == SET_OUT:
             back = Return(offset, rate, self.rules.duration(offset, joints))  # x_d,r is where the task is now
         else:
             back = back.later(self.dt)

@@ -46,7 +46,9 @@ def phases_by(ask: Ask) -> tuple[Callable[..., tuple[int, bool]], Callable[..., 
             return RECOVERING, False
         return FOLLOWING, False
 
-    def advance(time: float, rate: float, paused: bool, step: float, dt: float, of: Any) -> tuple[float, float, bool]:
+    def advance(
+        time: float, rate: float, paused: bool, step: float, dt: float, events: bool, of: Any
+    ) -> tuple[float, float, bool]:
         """Time on the path and rate of its clock after a tick; and whether an event waits for its tasks.
 
         Args:
@@ -55,11 +57,12 @@ def phases_by(ask: Ask) -> tuple[Callable[..., tuple[int, bool]], Callable[..., 
             paused: Whether it is to come to rest.
             step: Largest change of the rate.
             dt: Tick [s].
+            events: Whether there are any.
             of: Handed on to who answers.
         """
         rate = max(rate - step, 0.0) if paused else min(rate + step, 1.0)
         ahead = time + rate * dt
-        waits = ask(DUE, of, ahead) and not ask(MET, of, time)  # no grip beside the part
+        waits = events and ask(DUE, of, ahead) and not ask(MET, of, time)  # no grip beside the part
         return (time if waits else ahead), rate, waits
 
     return next_phase, advance

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 import qpsafe
-from qpsafe.batch import blocks, code, cuts
-from qpsafe.batch.pack import new_state, new_work, pack
+from qpsafe.batch import code
+from qpsafe.batch.pack import new_state, new_work, own_of, pack
 from qpsafe.batch.tick_kernel import tick
 from qpsafe.recovery.steps import PHASES
 
@@ -19,8 +19,7 @@ def test_points_that_come_and_go_give_the_same_bits(irb140: Any) -> None:
     )
     packed = pack(controller)
     state, work = new_state(packed, 1), new_work(packed, points=1)
-    integers = packed.blocks[1]
-    own = cuts.own(state.floats[0], state.integers[0], integers[code.HEADS + blocks.SHARED :][: blocks.OWN], integers)
+    own = own_of(packed, state.floats[0], state.integers[0])
     place = irb140.pose("tcp", irb140.home)[:3, 3]
     q, qd, phases, statuses = np.array(irb140.home), np.zeros(6), set(), set()
     for k in range(500):
