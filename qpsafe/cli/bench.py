@@ -46,9 +46,18 @@ def bench(
     with progress_bar(screen) as progress:
         task = progress.add_task("timing, block by block", total=len(timed) * ticks)
         times = time_rows(timed, ticks, peer=MINK, progress=partial(progress.advance, task))
+        progress.add_task("the campaign's engine, and MuJoCo with the controller in a loop", total=None)
+        from qpsafe.sim.campaign.speed import engine_speed
+
+        speed = engine_speed(mujoco=True)
     if not json:
         show(times, machine(), screen)
-    _write(screen, out, json, {name: t._asdict() for name, t in times.items()})
+        screen.print(
+            f"Encounters, simulated seconds a second of one core: engine {speed.engine:.0f}, with planning what people "
+            f"do {speed.planned:.0f}, MuJoCo in a loop {speed.mujoco:.1f}; ratio {speed.ratio:.0f}"
+        )
+    content = {name: t._asdict() for name, t in times.items()}
+    _write(screen, out, json, content, {**speed._asdict(), "ratio": speed.ratio})
 
 
 def show(times: dict[str, Times], machine: dict[str, str], screen: Console) -> None:
@@ -100,11 +109,23 @@ def show_compilation(first: Start, later: Start, screen: Console) -> None:
     screen.print(sheet)
 
 
-def _write(screen: Console, out: Path | None, json: bool, results: dict[str, Any]) -> None:
-    """The results with the machine, in a file and on standard output where they are wanted."""
+def _write(
+    screen: Console, out: Path | None, json: bool, results: dict[str, Any], engine: dict[str, float] | None = None
+) -> None:
+    """The results with the machine, in a file and on standard output where they are wanted.
+
+    Args:
+        screen: Where to say so.
+        out: The file, if any.
+        json: Whether they are wanted on standard output.
+        results: By name, in seconds.
+        engine: Simulated seconds a second, if they were measured.
+    """
     from qpsafe.bench.clock import machine
 
     content = {"machine": machine(), "unit": "s", "results": results}
+    if engine is not None:
+        content["engine"] = {"unit": "simulated s/s", **engine}
     if out is not None:
         write_text(out, json_text(content) + "\n")
         screen.print(f"written to {out}")

@@ -106,7 +106,7 @@ class DangerBarrier(Fixed):
             end = state.robot.wire_frames[i][1]
             J, origin = state.jacobian(end), state.position(end)
             # J_i(p) q̇ = v_end + ω × (p - r_end);  gᵀ (ω × a) = (a × g)ᵀ ω
-            result -= gradient @ J[:3] + np.cross(points - origin, gradient) @ J[3:]
+            result -= gradient @ J[:3] + _cross(points - origin, gradient) @ J[3:]
         return result
 
     def kinetic_gradient(self, state: RobotState, qd: Array, points: Array) -> Array:
@@ -146,3 +146,11 @@ class DangerBarrier(Fixed):
         too_much = reachable & (room < H)
         factor = float((room[too_much] / H[too_much]).min(initial=1.0))
         return Scaling(factor, int((~reachable).sum()))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """a × b of rows (p, 3); numpy's own takes twenty times as long for a few."""
+    return a[:, _NEXT] * b[:, _LAST] - a[:, _LAST] * b[:, _NEXT]
+
+
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Case(Protocol):
-    """An encounter that is not drawn from a seed, see `qpsafe.sim.campaign.worst`."""
+    """An encounter that is not drawn from a seed, see `qpsafe.sim.campaign.worst.cases`."""
 
     @property
     def motion(self) -> str:

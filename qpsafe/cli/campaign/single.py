@@ -28,8 +28,8 @@ from qpsafe.text.json_text import json_text
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.campaign.search import Found
-    from qpsafe.sim.campaign.worst import Encounter
+    from qpsafe.sim.campaign.worst.cases import Encounter
+    from qpsafe.sim.campaign.worst.search import Found
 
 
 def show(
@@ -82,7 +82,7 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
 
 def _trial_or_case(text: str) -> int | Encounter:
     """The number of a trial, or a case of a file."""
-    from qpsafe.sim.campaign.worst import load_case
+    from qpsafe.sim.campaign.worst.cases import load_case
 
     file, _, number = text.rpartition("#")
     if not number.isdecimal():
@@ -113,8 +113,8 @@ def worst(
     Exit code 1 if the search could not find ten cases nearer than 50 mm that random trials did not.
     """
     screen = console(json)
-    from qpsafe.sim.campaign.search import WANTED
-    from qpsafe.sim.campaign.worst import cases_to_dict, find_worst
+    from qpsafe.sim.campaign.worst.cases import cases_to_dict, find_worst
+    from qpsafe.sim.campaign.worst.search import WANTED
 
     made = make_plan(
         plan, seed=seed, robot=robot, motions=motions, sensor=sensor, lag=lag, people=people, controllers=controller

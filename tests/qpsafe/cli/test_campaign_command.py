@@ -24,7 +24,7 @@ from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
 from qpsafe.sim.campaign.report.page import show_command
 from qpsafe.sim.campaign.runner import stored_results
 from qpsafe.sim.campaign.speed import Speed
-from qpsafe.sim.campaign.worst import Encounter, cases_to_dict, encounter_of, find_worst, load_case
+from qpsafe.sim.campaign.worst.cases import Encounter, cases_to_dict, encounter_of, find_worst, load_case
 from qpsafe.text.json_text import json_text
 
 FEW = ["--trials", "12", "--workers", "1", "--controllers", "none,stop,default"]

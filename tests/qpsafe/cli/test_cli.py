@@ -190,9 +190,12 @@ def test_rows_take_turns_and_are_compared_block_by_block() -> None:
     assert times["a"].ratio == times["a"].ratio_low == 1.0
 
 
-def test_bench_writes_its_figures(tmp_path: Path) -> None:
+def test_bench_writes_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from qpsafe.bench.peers import MINK
+    from qpsafe.sim.campaign.speed import Speed
 
+    speed = Speed(160.0, 110.0, 4.0)  # tests/sim/campaign times a real one
+    monkeypatch.setattr("qpsafe.sim.campaign.speed.engine_speed", lambda mujoco: speed)
     result = run(app, ["bench", "--ticks", "100", "--json", "--out", str(tmp_path / "bench.json")])
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout) == json.loads((tmp_path / "bench.json").read_text())
@@ -202,6 +205,7 @@ def test_bench_writes_its_figures(tmp_path: Path) -> None:
         assert 0.0 < times["ratio_low"] <= times["ratio"] <= times["ratio_high"]
     assert content["results"][MINK]["ratio"] == 1.0
     assert content["machine"]["processor"]
+    assert content["engine"]["ratio"] == 40.0
 
 
 def test_robots_add_writes_a_file_that_loads_and_never_over_another(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ from qpsafe.cli.demos import all_robots, fast_person, fixed, path, pick_and_plac
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.search import Case, Found
+from qpsafe.sim.campaign.worst.search import Case, Found
 
 HOSTILE = "arm[/x] [red]b[/] :smile: [0m]"
 WIDTHS = (60, 80)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
-from qpsafe.sim.campaign.search import LEAST, NEAR, UNLIKE, Evaluate, Found, search_worst
+from qpsafe.sim.campaign.worst.search import LEAST, NEAR, UNLIKE, Evaluate, Found, search_worst
 
 pytest.importorskip("cma")
 D = 12

@@ -3,6 +3,9 @@
 import engine_against_mujoco as benchmark
 import pytest
 
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.speed import engine_speed
+
 
 @pytest.mark.parametrize("trial", [0, 5])
 def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
@@ -21,6 +24,12 @@ def test_dynamics_move_the_robot_a_little_otherwise() -> None:
     found = benchmark.compared(0, dynamics=True, ticks=900)
     assert 0.0 < found["joints"] < 0.1
     assert found["contact"] == found["contact_there"]
+
+
+def test_the_engine_is_timed_beside_mujoco() -> None:
+    speed = engine_speed(Plan(motions=("hold",)), trials=1, mujoco=True)
+    assert speed.engine >= speed.planned > 0.0
+    assert speed.ratio > 1.0
 
 
 @pytest.mark.slow

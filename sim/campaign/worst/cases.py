@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.search import Found, search_worst
+from qpsafe.sim.campaign.worst.search import Found, search_worst
 
 
 class Encounter(NamedTuple):
