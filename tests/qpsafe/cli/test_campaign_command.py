@@ -304,8 +304,8 @@ def test_the_worst_cases_are_found_written_and_can_be_played_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     pytest.importorskip("cma")
-    monkeypatch.setattr("qpsafe.sim.campaign.worst._engine", lambda: play_case)
-    monkeypatch.setattr("qpsafe.sim.campaign.worst._continuous", lambda plan: np.ones(6, dtype=bool))
+    monkeypatch.setattr("qpsafe.sim.campaign.worst.cases._engine", lambda: play_case)
+    monkeypatch.setattr("qpsafe.sim.campaign.worst.cases._continuous", lambda plan: np.ones(6, dtype=bool))
     result = campaign("worst", "stop", "--trials", "600", "--workers", "1", "--json", "--out", "found")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
