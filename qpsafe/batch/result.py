@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,9 @@ class BatchTick:
 
     PHASES = PHASES
     STATUSES = STATUSES
+
+    PHASES: ClassVar[tuple[str, ...]] = PHASES
+    STATUSES: ClassVar[tuple[str, ...]] = STATUSES
 
     q: Array
     qd: Array
