@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from qpsafe.batch import code
 from qpsafe.batch.given import Given
+from qpsafe.batch.knots import Refused
 from qpsafe.batch.pack import new_state, new_work, own_of, pack, put, reset
 from qpsafe.batch.result import BatchTick
 from qpsafe.batch.words import words_of
@@ -40,6 +41,7 @@ class CompiledRobots:
     def __init__(self, controller: SafetyController, n: int, threads: int, horizon: float) -> None:
         self._controller, self._n, self._threads, self._horizon = controller, n, threads, float(horizon)
         self._packed = pack(controller, self._horizon)
+        self._ends = bool((self._packed.shared.kinds == code.ENDS).any())
         import qpsafe.batch.rows_kernel  # noqa: F401  compile it now if need be, not within the first tick
 
         self._state = new_state(self._packed, n)
@@ -54,11 +56,17 @@ class CompiledRobots:
         """One tick of all robots."""
         self._run(given)
         tick = self._told(given.wrong)
-        ends = (self._packed.shared.kinds == code.ENDS).any()
-        if ends and tick.path_time.max() + 2.0 * self._controller.dt > self._horizon:
-            self._horizon *= 2.0
-            self._packed = pack(self._controller, self._horizon)
+        if self._ends and tick.path_time.max() + 2.0 * self._controller.dt > self._horizon:
+            self._look_farther()
         return tick
+
+    def _look_farther(self) -> None:
+        """Look twice as far at trajectories that tell no end; where that cannot be, robots will brake there."""
+        self._horizon *= 2.0
+        try:
+            self._packed = pack(self._controller, self._horizon)
+        except Refused:
+            self._ends = False
 
     def _run(self, given: Given) -> None:
         """The ticks, shared out among the threads."""

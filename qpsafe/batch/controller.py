@@ -58,7 +58,7 @@ class BatchController:
         self.why = ""
         try:
             self._robots: CompiledRobots | GeneralRobots = CompiledRobots(
-                self._controller, self._n, len(os.sched_getaffinity(0)) if threads is None else int(threads), horizon
+                self._controller, self._n, _cores() if threads is None else int(threads), horizon
             )  # fmt: skip
         except Refused as reason:
             self.why, self._robots = str(reason), GeneralRobots(self._controller, self._n)
@@ -146,3 +146,8 @@ class BatchController:
         if numbers and not ((chosen >= 0) & (chosen < self._n)).all():
             raise ConfigurationError("BatchController", "mask", mask, f"numbers of robots, 0 to {self._n - 1}")
         return every[chosen]
+
+
+def _cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

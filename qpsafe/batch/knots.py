@@ -13,6 +13,7 @@ from qpsafe.batch import code, reference_kernel
 from qpsafe.batch.reference_kernel import interpolate
 from qpsafe.compiled.compiled import entry
 from qpsafe.compiled.memory import view
+from qpsafe.errors import in_words
 from qpsafe.tasks import clik, offset
 from qpsafe.tasks.moves import Arc, Dwell, JointMoveOfFrame, Line
 from qpsafe.tasks.offset import rate_of, rotation_between
@@ -134,7 +135,10 @@ def _events(trajectory: Any, end: float) -> tuple[tuple[float, str], ...]:
 def _sampled(trajectory: Any, times: Any) -> Array:
     knots = np.zeros((len(times), code.KNOT))
     for k, time in enumerate(times):
-        sample = trajectory.sample(float(time))
+        try:
+            sample = trajectory.sample(float(time))
+        except Exception as error:  # somebody's own
+            raise Refused(f"it fails at {time:.6g} s: {in_words(error)}") from error
         if type(sample) is not Sample or sample.pose.shape != (4, 4) or not sample.finite:
             raise Refused(f"its sample at {time:.6g} s is no finite Sample")
         knots[k, code.POSE : code.TWIST], knots[k, code.TWIST : code.TURN] = sample.pose.ravel(), sample.twist

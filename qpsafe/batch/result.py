@@ -8,18 +8,23 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.recovery.steps import PHASES
+from qpsafe.recovery import steps
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-#: Names of the phases and statuses, by the numbers in `BatchTick`.
-STATUSES = (OK, DEGRADED, BAD_INPUT, FAULT)
+
+class Names:
+    """What the numbers in a `BatchTick` stand for."""
+
+    __slots__ = ()
+    PHASES = steps.PHASES
+    STATUSES = (OK, DEGRADED, BAD_INPUT, FAULT)
 
 
 @dataclass(slots=True, eq=False, repr=False)
-class BatchTick:
+class BatchTick(Names):
     """Result of `BatchController.step`, a row a robot; its arrays are the caller's own.
 
     Attributes:
@@ -32,8 +37,8 @@ class BatchTick:
         f: Switch (21) (n,).
         activations: Of the tasks (n, tasks).
         qd0: Evasive velocities (n, joints) [rad/s].
-        phase: Numbers into `PHASES` (n,).
-        status: Numbers into `STATUSES` (n,).
+        phase: Numbers into `BatchTick.PHASES` (n,).
+        status: Numbers into `BatchTick.STATUSES` (n,).
         path_time: Clocks of the tasks' trajectories (n,) [s].
         waits_for: The tasks that each path waits for, a bit a task, the first one's is 1 (n,).
         errors: Errors of the commanded pose against the tasks' own trajectories, all rows in the tasks' order, NaN
@@ -42,9 +47,6 @@ class BatchTick:
         solve_time: Wall time of the whole call [s].
         words: `words(i)`: what is unusual about robot i's tick, a tuple of sentences.
     """
-
-    PHASES = PHASES
-    STATUSES = STATUSES
 
     q: Array
     qd: Array
@@ -65,7 +67,7 @@ class BatchTick:
     words: Callable[[int], tuple[str, ...]] = lambda robot: ()
 
     def __repr__(self) -> str:
-        count = {name: int((self.status == k).sum()) for k, name in enumerate(STATUSES)}
+        count = {name: int((self.status == k).sum()) for k, name in enumerate(self.STATUSES)}
         told = ", ".join(f"{number} {name}" for name, number in count.items() if number)
         return f"BatchTick({len(self.q)} robots: {told}, largest danger {np.nanmax(self.cdf_n, initial=0.0):.4g})"
 
@@ -90,8 +92,8 @@ class BatchTick:
             f=np.array([tick.f for tick in ticks]),
             activations=np.array([tick.activations for tick in ticks]),
             qd0=np.array([tick.qd0 for tick in ticks]),
-            phase=np.array([PHASES.index(tick.phase) for tick in ticks]),
-            status=np.array([STATUSES.index(tick.status) for tick in ticks]),
+            phase=np.array([cls.PHASES.index(tick.phase) for tick in ticks]),
+            status=np.array([cls.STATUSES.index(tick.status) for tick in ticks]),
             path_time=np.array([tick.path_time for tick in ticks]),
             waits_for=np.array([sum(1 << k for k, t in enumerate(tasks) if t in tick.waits_for) for tick in ticks]),
             errors=np.array([error if error.shape == none.shape else none for error in errors]),

@@ -84,8 +84,12 @@ def sense(
             s.qd[j] = s.before[j] = 0.0
     if how == code.NOTHING:
         return code.NOTHING_GIVEN if sane else code.NO_MEASUREMENT
-    if how == code.DISTANCES and s.age.shape[0] == 0:
+    spots_count = s.age.shape[0]
+    if how == code.DISTANCES and spots_count == 0:
         return code.NO_SPOTS if sane else code.NO_MEASUREMENT
+    too_many = how == code.POINTS and points.shape[0] > w.links.shape[0]
+    if too_many or (how == code.DISTANCES and not distances.shape[0] == ages.shape[0] == spots_count):
+        return code.WRONG_SIZE
     s.marks[code.CAPPED] = 0
     if how == code.DISTANCES:
         count, dying, out, cdf_n = _sense_readings(

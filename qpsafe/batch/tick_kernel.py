@@ -10,7 +10,8 @@ For compiled callers: `tick_compiled(*shared, *own, *work, q, qd, distances, age
     points   (p, 3) [m], p no more than `new_work` was told; (0, 3) where distances are given
     how      `DISTANCES`, `POINTS` or `NOTHING` of the two
 
-It returns the status, `OK` to `FAULT`; everything else of the tick stands in the robot's blocks then, cut by `own`.
+A caller that is an `entry` names `tick_kernel, *tick_kernel.USES` among what it uses. The tick returns the status, `OK`
+to `FAULT`; everything else stands in the robot's blocks then, see `pack.own_of`.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ _REASONS = {
     code.NO_MEASUREMENT: "q or qd is no measurement: not finite, or too far outside the limits",
     code.NOTHING_GIVEN: "neither distances nor points are given",
     code.NO_SPOTS: "distances are given but the robot has no spots",
+    code.WRONG_SIZE: "more points than there is room for, or not one distance and one age a spot",
     code.OUT_OF_ORDER: "too many spots are out of order: stopped",
     code.POINT_NOT_FINITE: "a point is not finite",
     code.DANGER_NOT_FINITE: "the danger of a point is not finite: joint values or points are out of all bounds",

@@ -176,8 +176,9 @@ class Recovery:
         if anew:
             self._suspend()
         elif before == phase == steps.FOLLOWING:
-            clock = self.path_time, self._rate, self.paused, self._step, self._dt, len(self._cursors) > 0
-            self.path_time, self._rate, waits = _advance(*clock, of)
+            self.path_time, self._rate, waits = _advance(
+                self.path_time, self._rate, self.paused, self._step, self._dt, bool(self._cursors), of
+            )  # fmt: skip
             if waits:
                 self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))
         if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import qpsafe
-from qpsafe.batch.result import STATUSES
-from qpsafe.recovery.steps import PHASES
 
 NOBODY = np.zeros((0, 3))
 
@@ -75,7 +73,7 @@ class Pairs:
         assert np.array_equal(np.c_[tick.active, tick.seq], expected)
 
     def _compare_words(self, r: int, one: Any, tick: Any) -> None:
-        assert (PHASES[tick.phase[r]], STATUSES[tick.status[r]]) == (one.phase, one.status), one.messages
+        assert (tick.PHASES[tick.phase[r]], tick.STATUSES[tick.status[r]]) == (one.phase, one.status), one.messages
         assert tick.events.get(r, ()) == one.events
         waits = [task.name for k, task in enumerate(self.controllers[r].tasks) if tick.waits_for[r] >> k & 1]
         assert tuple(waits) == one.waits_for

@@ -45,3 +45,20 @@ def test_points_that_come_and_go_give_the_same_bits(irb140: Any) -> None:
         statuses.add(told.status)
     assert phases == {"following", "suspended", "recovering"}
     assert statuses == {"ok", "bad_input"}
+
+
+def test_what_does_not_fit_the_blocks_is_refused(irb140: Any) -> None:
+    """More points than there is room for, or another number of distances: nothing is written elsewhere."""
+    goal = qpsafe.FixedPose(irb140.pose("tcp", irb140.home))
+    packed = pack(qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", goal)]))
+    state, work = new_state(packed, 1), new_work(packed, points=2)
+    own, room, none = own_of(packed, state.floats[0], state.integers[0]), work[1][0], np.zeros(0)
+    row, rest = (state.floats[0], state.integers[0], state.spots[0]), np.zeros(6)
+    for points, distances, ages, how in (
+        (np.ones((room + 1, 3)), none, none, code.POINTS),
+        (np.zeros((0, 3)), np.full(21, np.inf), np.zeros(20), code.DISTANCES),
+        (np.zeros((0, 3)), np.full(20, np.inf), np.zeros(1), code.DISTANCES),
+    ):
+        assert tick(*packed.blocks, *row, *work, irb140.home, rest, distances, ages, points, how) == code.BAD_INPUT
+        assert own.marks[code.REASON] == code.WRONG_SIZE
+        assert not own.qd.any()

@@ -78,6 +78,33 @@ def test_what_cannot_be_followed_is_refused_by_name_and_works_the_general_way(
     assert words in batch.why
 
 
+class Late:
+    """Good for a while, then it fails."""
+
+    def __init__(self, place: np.ndarray) -> None:
+        self.place = place
+
+    def sample(self, t: float) -> Any:
+        if t > 0.25:
+            raise RuntimeError("no more")
+        return Sample(self.place, np.zeros(6))
+
+
+def test_a_path_that_fails_beyond_what_was_looked_at_makes_its_robots_brake_and_say_so(irb140: Any) -> None:
+    controller = qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", Late(irb140.pose("tcp", irb140.home)))])
+    batch = qpsafe.BatchController(controller, 2, horizon=0.2)
+    assert batch.compiled
+    q, qd = np.tile(irb140.home, (2, 1)), np.zeros((2, 6))
+    for _ in range(80):
+        tick = batch.step(q, qd, points=[[], []])
+        q, qd = tick.q, tick.qd
+    assert (tick.status == tick.STATUSES.index("fault")).all()
+    assert "horizon" in tick.words(0)[0]
+    assert (tick.path_time <= 0.2 + 1e-12).all()
+    assert not qd.any()
+    assert "no more" in qpsafe.BatchController(controller, 2, horizon=0.3).why
+
+
 def test_a_pose_that_does_not_move_is_one_knot() -> None:
     path = path_of(FixedPose(pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))), 0.004, 1.0)
     assert len(path.times) == 1
