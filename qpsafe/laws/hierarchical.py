@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from functools import cached_property, partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -16,11 +15,9 @@ from qpsafe.danger.activation import regime_weights
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
-from qpsafe.hqp.packing import Packed
-from qpsafe.hqp.solution import SOLVED, Solution
-from qpsafe.hqp.solve import STATUS, note_of, solve_hierarchy
+from qpsafe.hqp.solution import Solution
+from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.damping import DAMPING_TIME, threshold
-from qpsafe.laws.nullspace import paper_regime, pseudoinverse
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.text.words import call
 
@@ -79,8 +76,11 @@ class HierarchicalLaw(Fixed):
                 raise ConfigurationError("HierarchicalLaw", key, value, f"0 with solver {solver!r}")
         self.projection = projection
         self.solver = solver
+        # compile now if need be, not within the first tick
         if own:
-            import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
+            import qpsafe.hqp.own.solver
+        if projection == "paper":
+            import qpsafe.laws.projections  # noqa: F401
         self.damping, self.damping_time = float(damping), float(damping_time)
 
     def __repr__(self) -> str:
@@ -92,28 +92,31 @@ class HierarchicalLaw(Fixed):
         qd = np.zeros(len(problem.qd0))
         status = "solved"
         regimes = []
-        for kept, weight in enumerate(regime_weights(problem.activations)):
+        weights = regime_weights(problem.activations)
+        closing = self._closing(problem, int(np.flatnonzero(weights)[-1]))
+        for kept, weight in enumerate(weights):
             if weight > 0.0:
-                solution = self._solve_regime(problem, kept)
+                solution = self._solve_regime(problem, kept, closing[kept])
                 qd += weight * solution.qd
                 regimes.append((float(weight), solution))
                 if solution.status != "solved" and status == "solved":
                     status = solution.status
         return LawResult(qd, status, tuple(regimes))
 
-    def _solve_regime(self, problem: LawProblem, kept: int) -> Solution:
+    def _closing(self, problem: LawProblem, most: int) -> Sequence[Array]:
+        """What the last level of each regime asks for: q̇0, or what the paper adds below the first task."""
+        if self.projection == "strict" or most < 2:
+            return [problem.qd0] * (most + 1)
+        from qpsafe.laws.projections import regimes_of
+
+        # without N_0 P(J_1) ẋ_1: what lies in the range of P(J_1) is overruled by level 1
+        return [problem.qd0, problem.qd0, *regimes_of(problem.tasks[:most], problem.qd0, spared=1)[2:]]
+
+    def _solve_regime(self, problem: LawProblem, kept: int, closing: Array) -> Solution:
         """Solve the hierarchy that keeps the first `kept` tasks; equality levels are (A, b) pairs."""
-        identity = _identity(len(problem.qd0))
+        tasks: Sequence[TaskVelocity] = problem.tasks[: kept if self.projection == "strict" else min(kept, 1)]
         levels: list[Level | Sequence[NDArray[np.float64]]]
-        if self.projection == "strict" or kept < 2:
-            tasks: Sequence[TaskVelocity] = problem.tasks[:kept]
-            levels = [*problem.soft, *tasks, (identity, problem.qd0)]  # E closes every hierarchy
-        else:
-            tasks = problem.tasks[:1]
-            J_1, xd_1 = tasks[0]
-            # what the paper adds below the first task; its part in the range of P(J_1) is overruled by level 1
-            target = paper_regime(problem, kept) - pseudoinverse(J_1) @ xd_1
-            levels = [*problem.soft, (J_1, xd_1), (identity, target)]
+        levels = [*problem.soft, *tasks, (_identity(len(closing)), closing)]  # E closes every hierarchy
         damping, square = [0.0] * len(levels), self.damping**2
         for k in range(len(tasks)):
             correction = problem.corrections[k] if problem.corrections else _NONE
@@ -139,60 +142,6 @@ def weigh(activations: Any, weights: Any) -> Any:
 weigh_compiled = inline(weigh)
 
 
-class BlendResult(LawResult):
-    """The law's answer from what [`solve_regimes`][qpsafe.hqp.own.regimes.solve_regimes] computed: the same bits.
-
-    The regimes' solutions are made when they are looked at.
-
-    Args:
-        qd: Blend (n,).
-        x: Answers of the regimes (tasks + 1, n).
-        info: What the solver says about them.
-        weights: Of the regimes; those without were not solved.
-        data: J and ẋ of all tasks, q̇0, lower and upper limits: the solutions explain themselves with it.
-        counts: Rows of each task.
-        taken: Time of the call [s].
-        solved: Whether all regimes were.
-    """
-
-    def __init__(
-        self,
-        qd: Array,
-        x: Array,
-        info: NDArray[np.int64],
-        weights: Sequence[float],
-        data: tuple[Array, Array, Array, Array, Array],
-        counts: Sequence[int],
-        taken: float,
-        solved: bool,
-    ) -> None:
-        self.__dict__.update(qd=qd, status=SOLVED, _given=(x, info, weights, data, counts, taken))
-        if not solved:
-            bad = next(solution.status for _, solution in self.regimes if solution.status != SOLVED)
-            self.__dict__["status"] = bad
-
-    @cached_property
-    def regimes(self) -> tuple[tuple[float, Solution], ...]:  # type: ignore[override]
-        """(weight, solution) of every regime that was solved."""
-        data: tuple[Array, Array, Array, Array, Array]
-        x, info, weights, data, counts, taken = self.__dict__["_given"]
-        regimes = []
-        heads, share = info[:, :3].tolist(), taken / max(sum(map(bool, weights)), 1)
-        for kept, weight in enumerate(weights):
-            if weight > 0.0:
-                code, turns, where = heads[kept]
-                packed = partial(_packed, *data, counts[:kept])
-                note = note_of(STATUS[code], where, packed()) if code > 1 else ""
-                solution = Solution(x[kept], STATUS[code], turns, "own", share, packed, info[kept, 3:], note)
-                regimes.append((weight, solution))
-        return tuple(regimes)
-
-
-def _packed(A: Array, b: Array, qd0: Array, lower: Array, upper: Array, counts: Sequence[int]) -> Packed:
-    """The hierarchy of a regime as its solution wants it to explain itself."""
-    rows, n = sum(counts), len(qd0)
-    low = np.concatenate((b[:rows], qd0))
-    return Packed(np.concatenate((A[:rows], _identity(n))), low, low, None, [*counts, n], lower, upper, False)
 
 
 @functools.lru_cache(maxsize=32)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.compiled.compiled import inline
 from qpsafe.danger.activation import regime_weights
+from qpsafe.fixed import Fixed
+from qpsafe.hqp.own.level import RANK
 from qpsafe.hqp.own.state import HUGE
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.text.words import call
 
-#: Singular values below this fraction of the largest count as zero, here and in the QP solvers.
-RANK_TOLERANCE = 1e-10
+Array = NDArray[np.float64]
+
+#: Singular values below this fraction of the largest count as zero, as in the QP solvers.
+RANK_TOLERANCE = RANK
 
 
 def pseudoinverse(A: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,47 +65,40 @@ def nullspace_velocity(
     return m * qd_task + (f * N_m + (1.0 - f) * N_Hm) @ qd0  # (22)
 
 
-def paper_regime(problem: LawProblem, kept: int) -> NDArray[np.float64]:
-    """Joint velocity of the pure regime that keeps the first `kept` tasks, by pseudoinverses.
-
-    q̇ = Σ_i N_(i-1) P(J_i) ẋ_i + N_kept q̇0, where N_i projects onto the common null space of tasks 1..i. For one and two
-    tasks these are the pure regimes of (18) and (22); for more, their continuation.
-    """
-    n = len(problem.qd0)
-    qd = np.zeros(n)
-    N = np.eye(n)
-    stacked = np.zeros((0, n))
-    for J, xd in problem.tasks[:kept]:
-        qd = qd + N @ (pseudoinverse(J) @ xd)
-        stacked = np.vstack((stacked, J))
-        N = np.eye(n) - pseudoinverse(stacked) @ stacked
-    return qd + N @ problem.qd0
-
-
-class NullspaceLaw:
+class NullspaceLaw(Fixed):
     """The law of the paper: (18) for one task, (22) for two, the same blend of pure regimes for more.
 
     It takes no notice of limits; the controller clips what it returns.
     """
+
+    def __init__(self) -> None:
+        import qpsafe.laws.projections  # noqa: F401  compile it now if need be, not within the first tick
 
     def __repr__(self) -> str:
         return call(self)
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Evaluate the law for one tick; see `LawProblem` for shapes."""
-        n = len(problem.qd0)
-        tasks, a = problem.tasks, problem.activations
-        if len(tasks) == 1:
-            (J, xd), none = tasks[0], np.zeros(0)
-            qd = nullspace_velocity(J, np.zeros((0, n)), xd, none, problem.qd0, a[0], 1.0)
-        elif len(tasks) == 2:
-            (J_H, xd_H), (J_L, xd_L) = tasks
-            m = a[0]
-            f = a[1] / m if m > 0.0 else 0.0  # a_2 = m f
-            qd = nullspace_velocity(J_H, J_L, xd_H, xd_L, problem.qd0, m, f)
-        else:
-            qd = np.zeros(n)
-            for kept, weight in enumerate(regime_weights(a)):
-                if weight > 0.0:
-                    qd += weight * paper_regime(problem, kept)
-        return LawResult(qd)
+        from qpsafe.laws.projections import regimes_of
+
+        weights = regime_weights(problem.activations)
+        most = int(np.flatnonzero(weights)[-1])  # tasks that are kept at all
+        return LawResult(blend(weights, regimes_of(problem.tasks[:most], problem.qd0), np.zeros(len(problem.qd0))))
+
+
+def blend(weights: Any, x: Array, qd: Array) -> Array:
+    """Add Σ_k w_k x_k to qd and return it; regimes without weight do not count.
+
+    Args:
+        weights: (tasks + 1,), see `regime_weights`.
+        x: (tasks + 1, n) or less, where no others have weight.
+        qd: (n,).
+    """
+    for k in range(x.shape[0]):
+        if weights[k] > 0.0:
+            for j in range(qd.shape[0]):
+                qd[j] += weights[k] * x[k, j]
+    return qd
+
+
+blend_compiled = inline(blend)

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from qpsafe.compiled.compiled import inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.text.words import call, counted
+
+Array = NDArray[np.float64]
 
 
 class WeightedLaw(Fixed):
@@ -47,20 +53,61 @@ class WeightedLaw(Fixed):
         given = {"ratio": self.ratio} if self.weights is None else {"weights": self.weights}
         return call(self, **given, solver=self.solver)
 
-    def solve(self, problem: LawProblem) -> LawResult:
-        """Solve one tick; see `LawProblem` for shapes."""
-        n, count = len(problem.qd0), len(problem.tasks)
+    def importance(self, count: int) -> tuple[float, ...]:
+        """w_1, ..., w_N, w_E for so many tasks.
+
+        Raises:
+            ConfigurationError: The law was given weights for another number of tasks.
+        """
         weights = self.weights or tuple(self.ratio ** (count - k) for k in range(count + 1))
         if len(weights) != count + 1:
             raise ConfigurationError(
                 "WeightedLaw", "weights", weights, f"{count + 1} of them for {counted(count, 'task')}"
             )
-        closing = math.sqrt(weights[-1])
-        rows, targets = [closing * np.eye(n)], [closing * problem.qd0]
-        for k, ((J, xd), a) in enumerate(zip(problem.tasks, problem.activations, strict=True)):
-            scale = math.sqrt(a * weights[k])  # ||s (J q̇ - ẋ)||² = s² ||J q̇ - ẋ||²
-            rows.append(scale * J)
-            targets.append(scale * xd)
-        A, b = np.vstack(rows), np.concatenate(targets)
-        solution = solve_hierarchy([*problem.soft, Level(A, b, b)], problem.lower, problem.upper, solver=self.solver)
+        return weights
+
+    def solve(self, problem: LawProblem) -> LawResult:
+        """Solve one tick; see `LawProblem` for shapes."""
+        n, ends = len(problem.qd0), list(accumulate(len(xd) for _, xd in problem.tasks))
+        rows = n + (ends[-1] if ends else 0)
+        A, b = np.zeros((rows - n, n)), np.zeros(rows - n)
+        for (J, xd), last in zip(problem.tasks, ends, strict=True):
+            A[last - len(xd) : last], b[last - len(xd) : last] = J, xd
+        matrix, target = np.empty((rows, n)), np.empty(rows)
+        into_one(A, b, ends, problem.qd0, problem.activations, self.importance(len(ends)), matrix, target)
+        level = Level(matrix, target, target)
+        solution = solve_hierarchy([*problem.soft, level], problem.lower, problem.upper, solver=self.solver)
         return LawResult(solution.qd, solution.status, ((1.0, solution),))
+
+
+def into_one(
+    A: Array, b: Array, ends: Any, qd0: Array, activations: Any, importance: Any, matrix: Array, target: Array
+) -> None:
+    """Write the weighted sum as one level: √w_E (q̇ = q̇0), then √(a_k w_k) (J_k q̇ = ẋ_k).
+
+    Args:
+        A: (rows, n) Jacobians of all tasks, one below the other.
+        b: (rows,) their velocities.
+        ends: (tasks,) one past the last row of each.
+        qd0: (n,) evasive velocity.
+        activations: (tasks,).
+        importance: (tasks + 1,) w_1, ..., w_N, w_E.
+        matrix: (n + rows, n) result.
+        target: (n + rows,) result.
+    """
+    n, tasks, first = len(qd0), len(ends), 0
+    scale = math.sqrt(importance[tasks])
+    for i in range(n):
+        target[i] = scale * qd0[i]
+        for j in range(n):
+            matrix[i, j] = scale if i == j else 0.0
+    for k in range(tasks):
+        scale = math.sqrt(activations[k] * importance[k])  # ||s (J q̇ - ẋ)||² = s² ||J q̇ - ẋ||²
+        for i in range(first, ends[k]):
+            target[n + i] = scale * b[i]
+            for j in range(n):
+                matrix[n + i, j] = scale * A[i, j]
+        first = ends[k]
+
+
+into_one_compiled = inline(into_one)

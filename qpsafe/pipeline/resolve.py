@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from qpsafe.hqp.own.regimes import MOST_LAYOUTS, layout_for
 from qpsafe.hqp.solution import SOLVED
-from qpsafe.laws.hierarchical import BlendResult, HierarchicalLaw, weigh
+from qpsafe.laws.explained import Solved, explain
+from qpsafe.laws.hierarchical import weigh
+from qpsafe.laws.kinds import NULLSPACE, OTHER, PAPER, STRICT, WEIGHTED, kind_of, numbers_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
@@ -49,7 +51,8 @@ class Resolved:
         box: Admissible velocities, if they are known already.
         result: The law's answer, likewise.
         frozen: Else they are made from the results of `resolve_tick`, the evasive velocity, the regimes' weights, the
-            rows of each task, the time it took [s], and whether there are limits.
+            rows of each task, the time it took [s], kind, weights and activations of the law for `explain`, and
+            whether there are limits.
     """
 
     def __init__(
@@ -62,7 +65,7 @@ class Resolved:
     @cached_property
     def _parts(self) -> Parts:
         assert self._frozen is not None
-        floats, integers, _, weights, counts, _, _ = self._frozen
+        floats, integers, _, weights, counts, *_ = self._frozen
         return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
 
     @cached_property
@@ -77,9 +80,11 @@ class Resolved:
         """The law's answer; None if it was not asked."""
         if self._result is not None or self._frozen is None:
             return self._result
-        cut, (_, _, qd0, weights, counts, taken, _) = self._parts, self._frozen
-        data = (cut.A, cut.b, qd0, *cut.bounds)
-        return BlendResult(cut.blend, cut.x, cut.info, weights, data, counts, taken, self.solved)
+        cut, (_, _, qd0, weights, counts, taken, how, _) = self._parts, self._frozen
+        solved = Solved(
+            cut.A, cut.b, qd0, cut.bounds[0], cut.bounds[1], cut.blend, cut.x, cut.info, weights, counts, taken
+        )
+        return explain(solved, self.solved, *how)
 
     @cached_property
     def errors(self) -> tuple[Array, ...]:
@@ -104,8 +109,13 @@ class Resolve:
         self._robot, self._dt = robot, dt
         #: Rows of each task that the compiled call fills in, None for the others.
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
-        own = type(law) is HierarchicalLaw and law.solver in (None, "own")
-        self._ours = own and (law.projection == "strict" or len(tasks) == 1)  # type: ignore[attr-defined]
+        self._kind = kind_of(law, len(tasks))
+        *damping, importance = numbers_of(law, len(tasks)) if self._kind != OTHER else (0.0, 0.0, ())
+        self._numbers = (*damping, np.array(importance))
+        if self._kind in (PAPER, NULLSPACE, WEIGHTED):
+            from qpsafe.pipeline.law_kernel import law_tick  # not compiled for the strict law
+
+            self._law_tick = law_tick
         self._block = np.zeros(26 * len(tasks) + 2 + robot.nq)
         cut = given(self._block, robot.nq, len(tasks))
         self._gains, self._standing, self._goals, self._twists, self._weights, _, self._qd0 = cut
@@ -153,17 +163,22 @@ class Resolve:
                 box = checked_box(box, limits, state.q, qd)
             self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        ours = self._ours and limits is not None and not soft
+        ours = self._kind != OTHER and limits is not None and not soft
         self._qd0[:], weights = qd0, weigh(activations, self._weights).tolist()
-        law = self.parts[1]
-        damping = (law.damping, law.damping_time) if ours else (np.nan, np.nan)  # type: ignore[attr-defined]
+        damping = self._numbers[:2] if ours and self._kind == STRICT else (np.nan, np.nan)
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
             table, self._dt, return_speed, *damping, *layout, floats, integers, command,
         )  # fmt: skip
+        if ours and self._kind != STRICT:
+            excess, worst = self._law_tick(
+                self._kind, *self._numbers, np.array(activations), self._dt, self._block, *layout, floats, integers,
+                command,
+            )  # fmt: skip
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
-        frozen = (floats, integers, qd0, weights, counts, perf_counter() - begin, limits is not None)
+        taken, how = perf_counter() - begin, (self._kind, self._numbers[2], activations)
+        frozen = (floats, integers, qd0, weights, counts, taken, how, limits is not None)
         if ours:
             if not plain:  # whatever limits of another making do to it
                 check_command(command, self._dt)
@@ -196,7 +211,7 @@ class Resolve:
         kinds = [rows if rows is not None else (0,) * count for rows, count in zip(self._rows, counts, strict=True)]
         rows = np.array([row for kind in kinds for row in kind], dtype=np.int64)
         n = self._robot.nq
-        return rows, layout_for(n, counts), sizes_of(n, len(rows), len(counts) + 1)
+        return rows, layout_for(n, counts, self._kind == WEIGHTED), sizes_of(n, len(rows), len(counts) + 1)
 
     @staticmethod
     def _fill(cut: Parts, asked: dict[int, Clik], counts: tuple[int, ...], box: Box | None) -> None:
@@ -215,7 +230,7 @@ class Resolve:
         self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]
     ) -> Resolved:
         """Ask a law of another making, or for what the compiled call does not know."""
-        cut, (_, _, qd0, _, counts, _, limited) = made._parts, made._frozen  # type: ignore[misc]
+        cut, (_, _, qd0, _, counts, *_, limited) = made._parts, made._frozen  # type: ignore[misc]
         pairs = list(pairwise([0, *accumulate(counts)]))
         wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
         corrections = tuple([task.gain * cut.e[a:b] for task, (a, b) in zip(self.parts[0], pairs, strict=True)])

@@ -110,9 +110,24 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
     )
 
 
-_cut, _given = inline(parts), inline(given)
+cut_parts, cut_given = inline(parts), inline(given)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
 _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.float64[::1], types.int64[::1]
+
+
+@inline
+def sent(blend: Array, bounds: Array, codes: Index, info: Index, dt: float, command: Array) -> tuple[float, float]:
+    """Check the law's q̇: finite, sane; and bring it inside the box. Returns what `resolve_tick` does."""
+    sane = True
+    for i in range(blend.shape[0]):
+        command[i] = blend[i]
+        sane = sane and abs(blend[i]) * dt < ABSURD_STEP  # false for NaN
+    if not sane:
+        return -1.0, 0.0
+    worst = 0
+    for kept in range(info.shape[0]):
+        worst = max(worst, info[kept, 0])
+    return admit_into(blend, bounds[0], bounds[1], codes[2], command), float(worst)
 
 
 @entry(
@@ -149,8 +164,8 @@ def resolve_tick(
         By how much the law's q̇ was outside, -1 if it is absurd; the worst code of the solver.
     """  # fmt: skip
     n, tasks = q.shape[0], bodies.shape[0]
-    A, b, e, x, bounds, blend, codes, info = _cut(floats, integers, n, rows.shape[0], tasks + 1)
-    gains, standing, goals, twists, weights, near, qd0 = _given(block, n, tasks)
+    A, b, e, x, bounds, blend, codes, info = cut_parts(floats, integers, n, rows.shape[0], tasks + 1)
+    gains, standing, goals, twists, weights, near, qd0 = cut_given(block, n, tasks)
     poses, axes, _, _ = cut(memory, n, k)
     square = damping * damping
     # CLIK: ẋ = ẋ_d + K e
@@ -172,14 +187,4 @@ def resolve_tick(
         work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], near, x, info,
         blend,
     )  # fmt: skip
-    # checked: finite, sane, inside the box
-    sane = True
-    for i in range(n):
-        command[i] = blend[i]
-        sane = sane and abs(blend[i]) * dt < ABSURD_STEP  # false for NaN
-    if not sane:
-        return -1.0, 0.0
-    worst = 0
-    for kept in range(info.shape[0]):
-        worst = max(worst, info[kept, 0])
-    return admit_into(blend, bounds[0], bounds[1], codes[2], command), float(worst)
+    return sent(blend, bounds, codes, info, dt, command)

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import sqrt
 
 from qpsafe.compiled.compiled import inline
-from qpsafe.hqp.own.linear import Array
+from qpsafe.hqp.own.linear import Array, jacobi
 from qpsafe.hqp.own.state import State
 
 WITHOUT, WITH = 1, 2  # what to do with nearly singular directions
@@ -59,10 +59,7 @@ def separate(s: State, first: int, count: int, start: int) -> None:
                 if not abs(ab) > 1e-15 * sqrt(aa * bb):
                     continue
                 turned = True
-                zeta = (bb - aa) / (2.0 * ab)
-                t = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + sqrt(1.0 + zeta * zeta))
-                cosine = 1.0 / sqrt(1.0 + t * t)
-                sine = cosine * t
+                cosine, sine = jacobi(aa, bb, ab)
                 for j in range(k):
                     p, q = F[a, j], F[b, j]
                     F[a, j], F[b, j] = cosine * p - sine * q, sine * p + cosine * q

@@ -187,6 +187,21 @@ def unturn(F: Array, tau: Array, rank: int, k: int, p: Array) -> None:
 
 
 @inline
+def jacobi(aa: float, bb: float, ab: float) -> tuple[float, float]:
+    """Cosine and sine of the rotation (a, b) -> (c a - s b, s a + c b) that makes two rows orthogonal.
+
+    Args:
+        aa: a·a.
+        bb: b·b.
+        ab: a·b, not 0.
+    """
+    zeta = (bb - aa) / (2.0 * ab)
+    t = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + sqrt(1.0 + zeta * zeta))
+    cosine = 1.0 / sqrt(1.0 + t * t)
+    return cosine, cosine * t
+
+
+@inline
 def remove_column(G: Array, width: int, R: Array, start: int, w: int, gone: int) -> None:
     """Take working constraint `gone` out of the triangle R, (w, w), and give its direction back to N.
 

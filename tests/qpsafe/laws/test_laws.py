@@ -9,8 +9,9 @@ from scipy.optimize import lsq_linear
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.equivalence import compare_states, random_states
 from qpsafe.laws.hierarchical import HierarchicalLaw
-from qpsafe.laws.nullspace import NullspaceLaw, nullspace_velocity, paper_regime, pseudoinverse
+from qpsafe.laws.nullspace import NullspaceLaw, nullspace_velocity, pseudoinverse
 from qpsafe.laws.problem import LawProblem, TaskVelocity
+from qpsafe.laws.projections import regimes_of
 from qpsafe.laws.weighted import WeightedLaw
 
 STATES = list(random_states(54, seed=11))
@@ -21,7 +22,7 @@ unit = st.floats(0.0, 1.0)
 def test_null_space_law_is_the_blend_of_three_regimes() -> None:
     """(22) = (1-m) q̇0 + m (1-f) q̇_medium + m f q̇_low, with rank-deficient Jacobians among the states."""
     for s in random_states(300, seed=5):
-        regimes = [paper_regime(s.problem(), kept) for kept in (0, 1, 2)]
+        regimes = regimes_of(s.problem().tasks, s.qd0)
         blend = (1 - s.m) * regimes[0] + s.m * (1 - s.f) * regimes[1] + s.m * s.f * regimes[2]
         assert s.source_velocity() == pytest.approx(blend, abs=1e-10)
 

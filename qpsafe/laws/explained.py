@@ -1,0 +1,143 @@
+"""What compiled ticks answered, explained as the law's own `solve` would: made when it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from itertools import accumulate, pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.hqp.packing import Packed
+from qpsafe.hqp.solution import SOLVED, Solution
+from qpsafe.hqp.solve import STATUS, note_of
+from qpsafe.laws.kinds import NULLSPACE, PAPER, WEIGHTED
+from qpsafe.laws.problem import LawResult
+from qpsafe.laws.weighted import into_one
+
+Array = NDArray[np.float64]
+
+
+class Solved(NamedTuple):
+    """What a compiled tick has in its blocks once the law has answered.
+
+    Attributes:
+        A: Jacobians of the tasks (rows, n).
+        b: Their velocities (rows,).
+        qd0: Evasive velocity (n,).
+        lower: Limits (n,).
+        upper: Limits (n,).
+        qd: The law's q̇ (n,).
+        x: Answers of the solver (tasks + 1, n).
+        info: What it says about them.
+        weights: Of the regimes; those without were not solved.
+        counts: Rows of each task.
+        taken: Time of the call [s].
+    """
+
+    A: Array
+    b: Array
+    qd0: Array
+    lower: Array
+    upper: Array
+    qd: Array
+    x: Array
+    info: NDArray[np.int64]
+    weights: Sequence[float]
+    counts: Sequence[int]
+    taken: float
+
+
+def explain(s: Solved, solved: bool, kind: int, importance: Array, activations: Sequence[float]) -> LawResult:
+    """The law's answer.
+
+    Args:
+        s: What there is.
+        solved: Whether everything was.
+        kind: Of the law, see `kinds`.
+        importance: w_1, ..., w_N, w_E of a weighted one.
+        activations: (tasks,).
+    """
+    if kind == NULLSPACE:
+        return LawResult(s.qd)
+    if kind == WEIGHTED:
+        return BlendResult(s, solved, [1.0], partial(weighted_level, s, importance, activations))
+    return BlendResult(s, solved, s.weights, partial(paper_hierarchy if kind == PAPER else hierarchy, s))
+
+
+class BlendResult(LawResult):
+    """A blend of solutions, which are made when they are looked at: the same bits as those of `solve_hierarchy`.
+
+    Args:
+        s: What there is.
+        solved: Whether all regimes were.
+        weights: Of the regimes.
+        packed: Makes the problem of a regime, by number.
+    """
+
+    def __init__(self, s: Solved, solved: bool, weights: Sequence[float], packed: Callable[[int], Packed]) -> None:
+        self.__dict__.update(qd=s.qd, status=SOLVED, _given=(s, weights, packed))
+        if not solved:
+            bad = next(solution.status for _, solution in self.regimes if solution.status != SOLVED)
+            self.__dict__["status"] = bad
+
+    @cached_property
+    def regimes(self) -> tuple[tuple[float, Solution], ...]:  # type: ignore[override]
+        """(weight, solution) of every regime that was solved."""
+        s: Solved
+        s, weights, packed = self.__dict__["_given"]
+        regimes = []
+        heads, share = s.info[:, :3].tolist(), s.taken / max(sum(map(bool, weights)), 1)
+        for kept, weight in enumerate(weights):
+            if weight > 0.0:
+                code, turns, where = heads[kept]
+                problem = partial(packed, kept)
+                note = note_of(STATUS[code], where, problem()) if code > 1 else ""
+                solution = Solution(s.x[kept], STATUS[code], turns, "own", share, problem, s.info[kept, 3:], note)
+                regimes.append((weight, solution))
+        return tuple(regimes)
+
+
+def hierarchy(s: Solved, kept: int, closing: Array | None = None) -> Packed:
+    """[J_1 q̇ = ẋ_1 ≻ ... ≻ J_kept q̇ = ẋ_kept ≻ q̇ = closing].
+
+    Args:
+        s: What there is.
+        kept: How many tasks are.
+        closing: q̇0 if None.
+    """
+    counts, n = s.counts[:kept], len(s.qd0)
+    rows = sum(counts)
+    low = np.concatenate((s.b[:rows], s.qd0 if closing is None else closing))
+    return Packed(np.concatenate((s.A[:rows], np.eye(n))), low, low, None, [*counts, n], s.lower, s.upper, False)
+
+
+def paper_hierarchy(s: Solved, kept: int) -> Packed:
+    """[J_1 q̇ = ẋ_1 ≻ q̇ = what the paper adds below], for two tasks and more.
+
+    Args:
+        s: What there is.
+        kept: How many tasks are.
+    """
+    if kept < 2:
+        return hierarchy(s, kept)
+    from qpsafe.laws.projections import regimes_of
+
+    tasks = [(s.A[a:b], s.b[a:b]) for a, b in pairwise([0, *accumulate(s.counts[:kept])])]
+    return hierarchy(s, 1, regimes_of(tasks, s.qd0, spared=1)[kept])
+
+
+def weighted_level(s: Solved, importance: Array, activations: Sequence[float], _: int) -> Packed:
+    """The weighted sum as one level.
+
+    Args:
+        s: What there is.
+        importance: w_1, ..., w_N, w_E.
+        activations: (tasks,).
+    """
+    rows, n = len(s.b) + len(s.qd0), len(s.qd0)
+    matrix, target = np.empty((rows, n)), np.empty(rows)
+    into_one(s.A, s.b, list(accumulate(s.counts)), s.qd0, activations, importance, matrix, target)
+    return Packed(matrix, target, target, None, [rows], s.lower, s.upper, False)
