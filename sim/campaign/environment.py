@@ -1,142 +1,211 @@
 """An encounter as a `gymnasium.Env`: a policy moves the robot, the campaign's measures say how it went.
 
-    import gymnasium
-    import qpsafe.sim.campaign.environment  # registers qpsafe/Encounter-v0
-    env = gymnasium.make("qpsafe/Encounter-v0", motion="line")
-
-Action: joint velocities as shares of their limits, (n,) in [-1, 1]; whatever is asked for is brought inside the joint
-limits before the robot moves, as the controller's own commands are. Observation, (3 n + k + 12,): joint positions as
-shares of their range, joint velocities as shares of their limits, what the spots read (their range where they see
-nothing), the joints' command before, the first tool's error against its reference (m, rad) and the reference's twist.
-The work's clock runs while the tool is within `ON_PATH` of its reference, and stands otherwise.
-
-Reward of a tick: whether work was done, minus `HARM` times what comes nearer than `CAREFUL`, minus `TOUCH` at a
-contact, which ends the episode. The row of measures is in ``info["measures"]`` when an episode is over.
+Importing this module registers `ID`. Needs the extra "gym".
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.recording import Recording
+from qpsafe.sim.campaign.recording import STATUSES, Recording
 from qpsafe.sim.campaign.senses import Senses
 from qpsafe.sim.campaign.servo import DT, Servo
 from qpsafe.tasks.rotation import log3
+from qpsafe.tick import BAD_INPUT, OK
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box, Dict
+except ImportError as error:
+    raise MissingExtraError(f"gymnasium is not installed: pip install 'qpsafe[gym]' ({error})") from error
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.meeting import Meeting
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]
+Observation = dict[str, Array]
 
 ID = "qpsafe/Encounter-v0"
 ON_PATH = 0.02  # [m]
 CAREFUL, HARM, TOUCH = 0.2, 1.0, 100.0  # [m], reward per tick at distance 0, reward
+UNUSABLE = -1.0  # in the place of a reading that is no number
+OVERSHOOT = 1.0 + 2.0 * math.exp(-2.0)  # ∫|h| of a servo with a lag, h its impulse response ω (2 - ω t) exp(-ω t)
+MOST = 10.0  # of errors and twists [m, rad, m/s, rad/s]
+DRAWN = (2**24, 2**31)  # seeds of encounters that nobody asked for by number: none of those that campaigns begin with
+_EXACT = 1.0 + 1e-9
 
 
-class EncounterEnv(gymnasium.Env[Array, Array]):
-    """One robot among people; seeds are those of a campaign, so a policy can be compared with its controllers.
+class EncounterEnv(gymnasium.Env[Observation, Array]):
+    """One robot at its work among people who come; encounters are those of a campaign with the same seeds.
+
+    An action is a velocity for every joint as a share of its limit, (n,) in [-1, 1]. Whatever is asked for is brought
+    inside position, velocity and acceleration limits, as a controller's commands are; with a number that is not finite
+    in it, the whole action counts for nothing and the robot brakes. `info` says both.
+
+    The work's clock goes on while the tool is within `ON_PATH` of its reference, no faster than a robot is whom nobody
+    disturbs. Reward of a tick: 1 if it goes on, minus up to `HARM` for what is nearer than `CAREFUL`, minus `TOUCH`
+    at the first contact.
 
     Args:
         robot: A bundled robot or a path.
-        motion: What it does, see `qpsafe.sim.campaign.station`.
+        motion: ``hold``, ``line``, ``pick``, or the path of a program.
         sensor: ``ideal`` or ``sharp``.
-        lag: Of the servo [s].
+        lag: Delay of the servos [s].
         people: A TOML file with a model of people, None for the bundled one.
+        stop_at_contact: Whether a contact ends the episode; a campaign's trials go on.
+
+    Raises:
+        ConfigurationError: Of a value that is none of these.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(
         self, robot: str = "irb140", motion: str = "hold", sensor: str = "ideal", lag: float = 0.0,
-        people: str | None = None,
+        people: str | None = None, stop_at_contact: bool = True,
     ) -> None:  # fmt: skip
+        if sensor not in ("ideal", "sharp"):
+            raise ConfigurationError("EncounterEnv", "sensor", sensor, "ideal or sharp")
         self._plan = Plan(robot=robot, motions=(motion,), sensor=sensor, lag=lag, people=people, controllers=("none",))
+        self._stop_at_contact = stop_at_contact
         self._begin(0)
-        n, robot_ = self._n, self._met.station.robot
-        self._centre, self._half = 0.5 * (robot_.upper + robot_.lower), 0.5 * (robot_.upper - robot_.lower)
-        self._limits = JointLimits.of(robot_, DT)
-        spots = self._senses.spots
-        self._range = spots.range_max
-        size = 3 * n + len(spots) + 12
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float64)
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float64)
+        arm, k = self.station.robot, len(self.station.spots)
+        self._limits = JointLimits.of(arm, DT)
+        self._range = self.station.spots.range_max
+        most = OVERSHOOT if lag > 0.0 else _EXACT
+        middle, half = 0.5 * (arm.upper + arm.lower), 0.5 * (arm.upper - arm.lower)
+        fastest, six = arm.max_velocity, np.full(6, MOST)
+        self.action_space = Box(-1.0, 1.0, (arm.nq,), np.float64)
+        self.observation_space = Dict({
+            "q": Box(middle - most * half, middle + most * half, dtype=np.float64),
+            "qd": Box(-most * fastest, most * fastest, dtype=np.float64),
+            "command": Box(-_EXACT * fastest, _EXACT * fastest, dtype=np.float64),
+            "distances": Box(np.full(k, UNUSABLE), self._range, dtype=np.float64),
+            "error": Box(-six, six, dtype=np.float64),
+            "twist": Box(-six, six, dtype=np.float64),
+        })  # fmt: skip
 
-    def _begin(self, seed: int) -> None:
-        self._met: Meeting = meeting(self._plan, seed)
-        place = self._met.station
-        self._n = place.robot.nq
-        self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)
-        self._servo = Servo(place.start, self._plan.lag)
-        self._q, self._command = place.start.copy(), np.zeros(self._n)
-        self._k, self._time = 0, 0.0
-        self._rows: list[tuple[Any, ...]] = []
+    @property
+    def station(self) -> Station:
+        """Robot, cell and work, the same in all episodes."""
+        return self._met.station
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Begin an encounter: that of `seed`, else one drawn by the environment's own generator.
 
         Args:
-            seed: As the campaign's, its trial `seed` of a plan whose first seed is 0.
+            seed: As a campaign's trials have.
             options: Not used.
         """
         super().reset(seed=seed)
-        self._begin(int(self.np_random.integers(2**31)) if seed is None else seed)
+        self._begin(int(self.np_random.integers(*DRAWN)) if seed is None else int(seed))
         return self._observe(), {"seed": self._met.seed}
 
-    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Move for a tick of 4 ms."""
-        wish = np.nan_to_num(np.asarray(action, dtype=float).reshape(self._n), nan=0.0, posinf=1.0, neginf=-1.0)
-        robot = self._met.station.robot
-        command = self._limits.box(self._q, self._command).clip(np.clip(wish, -1.0, 1.0) * robot.max_velocity)
-        q, qd = self._servo.q, self._servo.qd
-        self._q = self._q + command * DT
-        self._command = command
-        off = float(np.linalg.norm(self._error[:3]))
-        working = off <= ON_PATH
-        self._time += DT * working
-        seen = self._senses.people_seen(q)
-        phase = FOLLOWING if working else SUSPENDED
-        self._rows.append((q, qd, self._q, command, phase, self._time, seen))
+    def tell(self, tick: Tick) -> None:
+        """What a policy that is a controller says about its next action: its own clock, phase, points and status.
+
+        Rows of measures take them from it, as a campaign does, instead of what the environment thinks.
+        """
+        self._told = tick
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Move for a tick of 4 ms.
+
+        Raises:
+            ConfigurationError: The action is not (n,).
+        """
+        wish = np.asarray(action, dtype=float)
+        if wish.shape != self._command.shape:
+            raise ConfigurationError("EncounterEnv", "action", wish.shape, f"an action of shape {self._command.shape}")
+        usable = bool(np.isfinite(wish).all())
+        asked = wish * self.station.robot.max_velocity if usable else np.zeros_like(wish)
+        command, outside = self._limits.box(self._q, self._command).admit(asked)
+        working = self._advance()
+        seen = self._senses.people_seen(self._servo.q)
+        said: tuple[Any, ...] = (FOLLOWING if working else SUSPENDED, self._time, OK if usable else BAD_INPUT, seen)
+        if self._told is not None:
+            said = self._told.phase, self._told.path_time, self._told.status, self._told.points
+            self._told = None
+        self._q, self._command = self._q + command * DT, command
+        self._rows.append((self._servo.q, self._servo.qd, self._q, command, *said))
         self._servo.follow(self._q, command)
         self._k += 1
-        place, tracks = self._met.station, self._met.tracks
-        poses = place.robot.at(self._servo.q).body_poses()
-        distance = place.distances.people(poses, tracks.row(min(self._k, len(tracks) - 1))).distance
-        touched, over = distance <= 0.0, self._k >= len(tracks)
+        observation = self._observe()
+        place, tracks, k = self.station, self._met.tracks, min(self._k, len(self._met.tracks) - 1)
+        distance = place.distances.people(place.robot.at(self._servo.q).body_poses(), tracks.row(k)).distance
+        touched = distance <= 0.0 and not self._touched and self._k < len(tracks)
+        self._touched |= touched
+        terminated = touched and self._stop_at_contact
+        truncated = self._k >= len(tracks) and not terminated
         reward = float(working) - HARM * max(1.0 - max(distance, 0.0) / CAREFUL, 0.0) - TOUCH * touched
-        info: dict[str, Any] = {"distance": distance}
-        if touched or over:
-            info["measures"] = measures(self._plan, self._met, "policy", self._recording())
-        return self._observe(), reward, bool(touched), bool(over and not touched), info
+        info: dict[str, Any] = {
+            "distance": distance, "contact": self._touched, "outside_limits": outside, "bad_action": not usable
+        }  # fmt: skip
+        if terminated or truncated:
+            info["measures"] = self.measures()
+        return observation, reward, terminated, truncated, info
 
-    def _observe(self) -> Array:
-        k = min(self._k, len(self._met.tracks) - 1)
-        q, qd, robot = self._servo.q, self._servo.qd, self._met.station.robot
-        self._readings = self._senses.distances(q, k)
-        sample = self._met.station.reference.sample(self._time)
-        pose = robot.pose(robot.tool_frames[0], q)
+    def measures(self, name: str = "policy") -> dict[str, Any]:
+        """The row of the encounter up to now, see `qpsafe.sim.campaign.rows`.
+
+        Args:
+            name: In the column ``controller``; a campaign's controller also gives the column ``sensor``.
+        """
+        if not self._rows:
+            raise ConfigurationError("EncounterEnv", "measures", "no tick yet", "an encounter that has begun")
+        rows = self._rows
+        if self._touched and self._stop_at_contact:  # the tick of the contact belongs to it
+            rows = [*rows, (self._servo.q, self._servo.qd, *rows[-1][2:])]
+        q, qd, ref, ref_qd, phase, time, status, seen = zip(*rows, strict=True)
+        marks = np.array([STATUSES.index(word) for word in status], dtype=np.int64)
+        run = Recording(
+            DT, np.array(q), np.array(qd), np.array(ref), np.array(ref_qd), np.array(phase), np.array(time), marks,
+            list(seen),
+        )  # fmt: skip
+        return measures(self._plan, self._met, name, run)
+
+    def _begin(self, seed: int) -> None:
+        self._met: Meeting = meeting(self._plan, seed)
+        place = self.station
+        self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)
+        self._servo = Servo(place.start, self._plan.lag)
+        self._q, self._command = place.start.copy(), np.zeros(place.robot.nq)
+        self._k, self._time, self._touched = 0, 0.0, False
+        self._told: Tick | None = None
+        self._rows: list[tuple[Any, ...]] = []
+
+    def _advance(self) -> bool:
+        """Let the work's clock go on if the tool is where it should be."""
+        if not float(np.linalg.norm(self._error[:3])) <= ON_PATH:
+            return False
+        self._time = min(self._time + DT, self.station.nominal(self._k + 1))
+        return True
+
+    def _observe(self) -> Observation:
+        q, qd, robot = self._servo.q, self._servo.qd, self.station.robot
+        readings = self._senses.distances(q, min(self._k, len(self._met.tracks) - 1))
+        readings = np.where(np.isnan(readings), UNUSABLE, np.minimum(readings, self._range))
+        sample, pose = self.station.reference.sample(self._time), robot.pose(robot.tool_frames[0], q)
         turn = log3(sample.pose[:3, :3] @ pose[:3, :3].T)
         self._error = np.concatenate((sample.pose[:3, 3] - pose[:3, 3], turn))
-        readings = np.minimum(np.nan_to_num(self._readings, nan=0.0), self._range)
-        return np.concatenate((
-            (q - self._centre) / self._half, qd / robot.max_velocity, self._command / robot.max_velocity,
-            readings, self._error, sample.twist,
-        ))  # fmt: skip
-
-    def _recording(self) -> Recording:
-        q, qd, ref, ref_qd, phase, time, seen = zip(*self._rows, strict=True)
-        return Recording(
-            DT, np.array(q), np.array(qd), np.array(ref), np.array(ref_qd), np.array(phase), np.array(time),
-            np.zeros(len(q), dtype=np.int64), list(seen),
-        )  # fmt: skip
+        return {
+            "q": q.copy(), "qd": qd.copy(), "command": self._command.copy(), "distances": readings,
+            "error": np.clip(self._error, -MOST, MOST), "twist": np.clip(sample.twist, -MOST, MOST),
+        }  # fmt: skip
 
 
 gymnasium.register(ID, entry_point=EncounterEnv)
