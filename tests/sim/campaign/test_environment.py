@@ -15,13 +15,13 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from numpy.testing import assert_allclose, assert_array_equal
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
-from qpsafe.sim.campaign import environment
-from qpsafe.sim.campaign.environment import ID, EncounterEnv, Observation
+from qpsafe.sim.campaign.gym import environment
+from qpsafe.sim.campaign.gym.environment import ID, EncounterEnv, Observation
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.opponents.registry import opponent
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.policies import ControllerPolicy, episode
+from qpsafe.sim.campaign.gym.policies import ControllerPolicy, episode
 from qpsafe.sim.campaign.trial import recorded
 
 HERE = Path(environment.__file__).resolve()
@@ -200,7 +200,7 @@ def test_without_gymnasium_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_nothing_else_needs_gymnasium() -> None:
-    root = HERE.parents[2]
+    root = HERE.parents[3]
     files = [path for name in ("qpsafe", "tasks", "robots", "sim") for path in (root / name).rglob("*.py")]
-    needed = re.compile(r"^\s*(import|from) (gymnasium|qpsafe\.sim\.campaign\.environment)\b(?! import Enc)", re.M)
+    needed = re.compile(r"^\s*(import|from) (gymnasium|qpsafe\.sim\.campaign\.gym\.environment)\b(?! import Enc)", re.M)
     assert [path for path in files if needed.search(path.read_text(encoding="utf-8"))] == [HERE]

@@ -1,4 +1,4 @@
-"""Controllers as policies of the environment of `qpsafe.sim.campaign.environment`, and rows of policies."""
+"""Controllers as policies of the environment of `qpsafe.sim.campaign.gym.environment`, and rows of policies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.environment import EncounterEnv, Observation
+    from qpsafe.sim.campaign.gym.environment import EncounterEnv, Observation
     from qpsafe.sim.campaign.opponents.registry import Controls
     from qpsafe.sim.campaign.station import Station
     from qpsafe.tick import Tick

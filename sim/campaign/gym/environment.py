@@ -80,6 +80,9 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
             raise ConfigurationError("EncounterEnv", "sensor", sensor, "ideal or sharp")
         self._plan = Plan(robot=robot, motions=(motion,), sensor=sensor, lag=lag, people=people, controllers=("none",))
         self._stop_at_contact = stop_at_contact
+        self._told: Tick | None = None
+        self._k, self._time, self._touched = 0, 0.0, False
+        self._rows: list[tuple[Any, ...]] = []
         self._begin(0)
         arm, k = self.station.robot, len(self.station.spots)
         self._limits = JointLimits.of(arm, DT)
@@ -183,10 +186,10 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         place = self.station
         self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)
         self._servo = Servo(place.start, self._plan.lag)
-        self._q, self._command = place.start.copy(), np.zeros(place.robot.nq)
+        self._q: Array = place.start.copy()
+        self._command: Array = np.zeros(place.robot.nq)
         self._k, self._time, self._touched = 0, 0.0, False
-        self._told: Tick | None = None
-        self._rows: list[tuple[Any, ...]] = []
+        self._told, self._rows = None, []
 
     def _advance(self) -> bool:
         """Let the work's clock go on if the tool is where it should be."""
