@@ -71,6 +71,8 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    _q: Array
+    _command: Array
 
     def __init__(
         self, robot: str = "irb140", motion: str = "hold", sensor: str = "ideal", lag: float = 0.0,
@@ -186,8 +188,7 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         place = self.station
         self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)
         self._servo = Servo(place.start, self._plan.lag)
-        self._q: Array = place.start.copy()
-        self._command: Array = np.zeros(place.robot.nq)
+        self._q, self._command = place.start.copy(), np.zeros(place.robot.nq)
         self._k, self._time, self._touched = 0, 0.0, False
         self._told, self._rows = None, []
 

@@ -17,11 +17,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.gym import environment
 from qpsafe.sim.campaign.gym.environment import ID, EncounterEnv, Observation
+from qpsafe.sim.campaign.gym.policies import ControllerPolicy, episode
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.opponents.registry import opponent
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.gym.policies import ControllerPolicy, episode
 from qpsafe.sim.campaign.trial import recorded
 
 HERE = Path(environment.__file__).resolve()
