@@ -25,25 +25,6 @@ from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.trial import recorded
 
 HERE = Path(environment.__file__).resolve()
-SHORT = """
-[[person]]
-name = "Ada"
-start = [1.35, 0.1]
-heading = 180.0
-
-[[person.step]]
-do = "walk"
-to = [0.5, 0.05]
-speed = 1.6
-"""
-
-
-@pytest.fixture(scope="module")
-def people(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Somebody who walks into the robot, within a second or so."""
-    path = tmp_path_factory.mktemp("people") / "ada.toml"
-    path.write_text(SHORT)
-    return str(path)
 
 
 @pytest.fixture
