@@ -142,8 +142,6 @@ def weigh(activations: Any, weights: Any) -> Any:
 weigh_compiled = inline(weigh)
 
 
-
-
 @functools.lru_cache(maxsize=32)
 def _identity(n: int) -> NDArray[np.float64]:
     identity = np.eye(n)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 
 def counted(number: int, noun: str) -> str:
     """The number and its noun, with an s unless there is one."""
@@ -31,3 +33,8 @@ def _word(value: object) -> str:
     if hasattr(value, "tolist") and hasattr(value, "ravel"):  # an array, without importing numpy here
         return "[" + ", ".join(f"{number + 0.0:.4g}" for number in value.ravel().tolist()) + "]"
     return repr(value)
+
+
+def file_word(name: str) -> str:
+    """A name as a part of a file's: letters, digits, dots and hyphens, none of them at its ends."""
+    return re.sub(r"[^\w.]+", "-", name).strip("-.")

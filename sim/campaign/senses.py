@@ -64,6 +64,8 @@ class Senses:
     def people_seen(self, q: Array) -> Array:
         """Where the last readings met people (p, 3) [m]; q (n,) as then."""
         met = self._hits >= len(self._station.world.names)
+        if not met.any():
+            return np.empty((0, 3))
         origins, directions = self.spots.rays(self._station.robot.at(q))
         return np.asarray(origins[met] + self._true[met, None] * directions[met])
 

@@ -31,11 +31,11 @@ Workers = Annotated[int, typer.Option(min=1, help="Processes; by default one a p
 Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler, which takes the place of --workers.")]
 
 
-def make_plan(file: Path | None, **given: Any) -> Plan:
-    """The plan of a file, or the default one, with options in the place of what it says.
+def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
+    """A plan, that of a file, or the default one, with options in the place of what it says.
 
     Args:
-        file: A plan's; None for none.
+        file: The plan, or its file; None for the default one.
         given: Keys of the plan; None where nothing was typed; several names in one word, separated by commas.
 
     Raises:
@@ -43,7 +43,7 @@ def make_plan(file: Path | None, **given: Any) -> Plan:
     """
     from qpsafe.sim.campaign.plan import Plan, load_plan
 
-    plan = Plan() if file is None else load_plan(file)
+    plan = Plan() if file is None else file if isinstance(file, Plan) else load_plan(file)
     typed = {key: value for key, value in given.items() if value is not None}
     for key in ("motions", "controllers"):
         if key in typed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,17 +25,20 @@ from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
+from qpsafe.text.words import file_word
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.campaign.worst.cases import Encounter
+    from qpsafe.sim.campaign.worst.cases import Case
     from qpsafe.sim.campaign.worst.search import Found
 
 
 def show(
     trial: Annotated[str, typer.Argument(help="Its number, or FILE.json#K: case K that `worst` has written.")],
-    controller: Annotated[str, typer.Option(help="Who is to be seen.")] = "default",
+    controller: Annotated[
+        str | None, typer.Option(help="Who is to be seen; by default the one of a case, or `default`.")
+    ] = None,
     plan: Annotated[Path | None, typer.Option("--file", help="The plan's file, if it has one.")] = None,
     seed: Seed = None,
     robot: Robot = None,
@@ -49,19 +53,34 @@ def show(
 ) -> None:
     """Play one trial again in the full MuJoCo scene: a video, and a table of all its ticks."""
     screen = console(json)
+    case, label = _case(trial)
+    if controller is None:
+        controller = case.controller if case else "default"
+    if case is not None and plan is not None:
+        raise ConfigurationError("qpsafe campaign show", "--file", str(plan), "none: a case has its plan with it")
     made = make_plan(
-        plan, seed=seed, robot=robot, motions=motions, sensor=sensor, lag=lag, people=people, controllers=controller
-    )
-    what = _trial_or_case(trial)
-    from qpsafe.sim.campaign.show import show as play  # type: ignore[import-not-found,unused-ignore]
+        case.plan if case else plan, seed=seed, robot=robot, motions=motions, sensor=sensor, lag=lag, people=people,
+        controllers=controller,
+    )  # fmt: skip
+    what = case.encounter if case else int(trial)
+    from qpsafe.sim.campaign.show import show as play
 
-    out.mkdir(parents=True, exist_ok=True)
-    row = play(made, what, controller, out)
+    with progress_bar(screen) as progress:
+        task = progress.add_task("ticks", total=None)
+        shown = play(
+            made, what, controller, out, label=label,
+            notice=lambda text: screen.print(text, style="yellow"),
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )  # fmt: skip
     if json:
-        print_json(row)
+        print_json(shown.row)
     else:
-        _show_row(row, screen)
-    screen.print(f"written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
+        _show_row(shown.row, screen)
+    screen.print(f"written to {out}: {', '.join(path.name for path in shown.files)}", soft_wrap=True)
+
+
+#: Columns that say nothing without a contact, besides those that are NaN then.
+OF_CONTACT = ("contact_class", "contact_region", "contact_frame", "moving", "towards", "clamped", "near_seen")
 
 
 def _show_row(row: dict[str, Any], screen: Console) -> None:
@@ -72,7 +91,8 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
     sheet = Sheet("What came of it", ("", "value", "unit"), text=(0, 2))
     for column in COLUMNS:
         value = row[column.name]
-        if value == value and value != "":  # neither NaN nor empty
+        beside = column.name in OF_CONTACT and not row["contact"]
+        if value == value and not beside:  # no NaN
             shown = (
                 f"{value:.4g}" if column.kind is float else str(value).lower() if column.kind is bool else str(value)
             )
@@ -80,15 +100,15 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
     screen.print(sheet)
 
 
-def _trial_or_case(text: str) -> int | Encounter:
-    """The number of a trial, or a case of a file."""
+def _case(text: str) -> tuple[Case | None, str]:
+    """The case of a file and a name for what is written of it; None where the number of a trial is meant."""
     from qpsafe.sim.campaign.worst.cases import load_case
 
     file, _, number = text.rpartition("#")
     if not number.isdecimal():
         expected = "the number of a trial, or FILE.json#K with the number of a case"
         raise ConfigurationError("qpsafe campaign show", "TRIAL", text, expected)
-    return load_case(Path(file), int(number)) if file else int(number)
+    return (load_case(Path(file), int(number)), f"{Path(file).stem}-{number}") if file else (None, "")
 
 
 def worst(
@@ -130,18 +150,18 @@ def worst(
             workers=workers,
         )
     out.mkdir(parents=True, exist_ok=True)
-    file = out / f"worst-{controller}.json"
+    file = out / f"worst-{file_word(controller)}.json"
     table = cases_to_dict(made, controller, found)
     write_text(file, json_text(table) + "\n")
     if json:
         print_json(table)
     else:
-        _show_cases(found, file, controller, made.options(("trials", "controllers")), screen)
+        _show_cases(found, file, controller, screen)
     if len(found.unlike) < WANTED:
         raise typer.Exit(1)
 
 
-def _show_cases(found: Found, file: Path, controller: str, options: str, screen: Console) -> None:
+def _show_cases(found: Found, file: Path, controller: str, screen: Console) -> None:
     from qpsafe.cli.sheet import Sheet
 
     sheet = Sheet(
@@ -154,5 +174,5 @@ def _show_cases(found: Found, file: Path, controller: str, options: str, screen:
     if sheet.rows:
         screen.print(sheet)
     screen.print(found.sentence)
-    command = f"qpsafe campaign show {file}#0 --controller {controller} {options}".rstrip()
-    screen.print(f"to see the first one: {command}")
+    if sheet.rows:
+        screen.print(f"to see the first one: qpsafe campaign show {shlex.quote(str(file))}#0", soft_wrap=True)

@@ -102,19 +102,38 @@ def cases_to_dict(plan: Plan, controller: str, found: Found) -> dict[str, Any]:
     return {"controller": controller, "plan": plan.to_dict()} | table | {"cases": [case(c) for c in table["cases"]]}
 
 
-def load_case(path: Path, number: int) -> Encounter:
+class Case(NamedTuple):
     """A case of a file that `cases_to_dict` made.
+
+    Attributes:
+        plan: Of the search.
+        controller: Whose worst case.
+        encounter: The case.
+    """
+
+    plan: Plan
+    controller: str
+    encounter: Encounter
+
+
+def load_case(path: Path, number: int) -> Case:
+    """Read a case.
 
     Args:
         path: The JSON file.
         number: From 0.
 
     Raises:
-        ConfigurationError: There is no such file or case.
+        ConfigurationError: There is no such file or case, or its plan names what is not there.
     """
     try:
-        case = json.loads(path.read_text(encoding="utf-8"))["cases"][number]
-        return Encounter(str(case["motion"]), tuple(float(x) for x in case["u"]))
+        table = json.loads(path.read_text(encoding="utf-8"))
+        case, said = table["cases"][number], table["plan"]
+        plan = said | {key: tuple(said[key]) for key in ("motions", "controllers")}
+        encounter = Encounter(str(case["motion"]), tuple(float(x) for x in case["u"]))
+        return Case(Plan(**plan), str(table["controller"]), encounter)
+    except ConfigurationError as wrong:
+        raise ConfigurationError(path, f"plan.{wrong.key}", wrong.value, wrong.expected) from None
     except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ConfigurationError(path, f"cases[{number}]", problem, "a case that a search has found") from None

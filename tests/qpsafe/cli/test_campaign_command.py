@@ -11,6 +11,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import made_up_trials
@@ -272,25 +273,37 @@ def test_show_plays_the_trial_or_the_case_that_is_named(monkeypatch: pytest.Monk
 
     class Module:
         @staticmethod
-        def show(*what: Any) -> dict[str, Any]:
-            played.append(what)
-            (what[3] / "video.mp4").touch()
-            return made_up_trials.row(what[0], 7, what[2], 0.0, False)
+        def show(*what: Any, label: str, notice: Any, progress: Any) -> Any:
+            played.append((*what, label))
+            notice("no video: too dark")
+            progress(1, 2)
+            row = made_up_trials.row(what[0], 7, what[2], 0.0, False)
+            return SimpleNamespace(row=row, files=(what[3] / "video.mp4",))
 
     monkeypatch.setitem(sys.modules, "qpsafe.sim.campaign.show", Module)  # type: ignore[arg-type]
     command = show_command(Plan(seed=9, sensor="sharp"), 7, "stop").split()
     assert command[:2] == ["qpsafe", "campaign"]
     result = campaign(*command[2:])
     assert result.exit_code == 0, result.output
-    assert "video.mp4" in result.output
-    assert "contact_region" in result.output
+    for word in ("video.mp4", "no video: too dark", "contact_region"):
+        assert word in result.output
     assert "nan" not in result.output
-    (tmp_path / "worst.json").write_text('{"cases": [{}, {"motion": "hold", "u": [0.25, 1]}]}')
-    told = campaign("show", "worst.json#1", "--out", "there", "--json")
+    table = {"plan": Plan(seed=3, lag=0.02).to_dict(), "controller": "strict"}
+    table["cases"] = [{}, {"motion": "hold", "u": [0.25, 1]}]
+    (tmp_path / "worst.json").write_text(json.dumps(table))
+    told = campaign("show", "worst.json#1", "--out", "there", "--seed", "5", "--json")
     assert json.loads(told.stdout)["contact"] is True
-    (plan, trial, controller, out), (other, case, name, there) = played
+    (plan, trial, controller, out, _), (other, case, name, there, label) = played
     assert (plan.seed, plan.sensor, trial, controller, out) == (9, "sharp", 7, "stop", Path("out/campaign-show"))
-    assert (other.seed, case, name, there) == (0, Encounter("hold", (0.25, 1.0)), "default", Path("there"))
+    assert (other.seed, other.lag, case) == (5, 0.02, Encounter("hold", (0.25, 1.0)))
+    assert (name, there, label) == ("strict", Path("there"), "worst-1")
+    (tmp_path / "plan.toml").write_text("trials = 3")
+    twice = campaign("show", "worst.json#1", "--file", "plan.toml")
+    assert "--file = 'plan.toml'" in str(twice.exception)
+    table["plan"]["robot"] = 7  # type: ignore[index]
+    table["plan"]["lag"] = 9.0  # type: ignore[index]
+    (tmp_path / "worst.json").write_text(json.dumps(table))
+    assert "worst.json: plan.lag = 9.0" in str(campaign("show", "worst.json#1").exception)
 
 
 def play_case(plan: Plan, case: Encounter, controller: str) -> dict[str, Any]:
@@ -312,12 +325,13 @@ def test_the_worst_cases_are_found_written_and_can_be_played_again(
     assert found == json.loads((tmp_path / "found" / "worst-stop.json").read_text())
     assert len(found["cases"]) == found["searched"] >= found["unlike"] >= 10
     for number, case in enumerate(found["cases"]):
-        again = load_case(tmp_path / "found" / "worst-stop.json", number)
+        plan, controller, again = load_case(tmp_path / "found" / "worst-stop.json", number)
+        assert (plan.seed, controller) == (0, "stop")
         assert again.motion == "pick"
         assert play_case(Plan(), again, "stop")["distance"] == case["row"]["distance"] < 0.05
     shown = campaign("worst", "stop", "--trials", "600", "--workers", "1", "--seed", "2", "--out", "found")
     text = " ".join(shown.output.split())
-    assert "qpsafe campaign show found/worst-stop.json#0 --controller stop --seed 2" in text
+    assert "qpsafe campaign show found/worst-stop.json#0" in text
     assert "unlike all random ones" in text
     little = campaign("worst", "stop", "--trials", "40", "--workers", "1", "--motions", "hold")
     assert little.exit_code == 1

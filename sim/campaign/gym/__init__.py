@@ -1,0 +1,1 @@
+"""Encounters as environments of gymnasium, and policies in them."""

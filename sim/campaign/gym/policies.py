@@ -1,0 +1,62 @@
+"""Controllers as policies of the environment of `qpsafe.sim.campaign.gym.environment`, and rows of policies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from qpsafe.sim.campaign.gym.environment import EncounterEnv, Observation
+    from qpsafe.sim.campaign.opponents.registry import Controls
+    from qpsafe.sim.campaign.station import Station
+    from qpsafe.tick import Tick
+
+Array = NDArray[np.float64]
+Policy = Callable[["Observation"], Array]
+
+
+class ControllerPolicy:
+    """A controller as a policy: what it commands as an action.
+
+    Args:
+        controls: A `SafetyController`, or what has the same `step`; fresh for each episode.
+        station: Of the environment.
+
+    Attributes:
+        tick: The last one, None before the first.
+    """
+
+    def __init__(self, controls: Controls, station: Station) -> None:
+        self._controls, self._station = controls, station
+        self.tick: Tick | None = None
+
+    def __call__(self, observation: Observation) -> Array:
+        """The action (n,) for an observation."""
+        d, spots = observation["distances"], self._station.spots
+        d = np.where(d < 0.0, np.nan, np.where(d >= spots.range_max, np.inf, d))
+        self.tick = self._controls.step(observation["q"], observation["qd"], d)
+        return np.asarray(self.tick.reference.qd / self._station.robot.max_velocity)
+
+
+def episode(env: EncounterEnv, policy: Policy, seed: int, name: str = "policy") -> dict[str, Any]:
+    """Play one encounter to its end; its row of measures.
+
+    Args:
+        env: The environment, without wrappers.
+        policy: From an observation to an action; a controller's says its own clock and phases, as in a campaign.
+        seed: Of the encounter.
+        name: In the row.
+    """
+    observation, _ = env.reset(seed=seed)
+    over = False
+    while not over:
+        action = policy(observation)
+        if isinstance(policy, ControllerPolicy):
+            assert policy.tick is not None
+            env.tell(policy.tick)
+        observation, _, terminated, truncated, _ = env.step(action)
+        over = terminated or truncated
+    return env.measures(name)
