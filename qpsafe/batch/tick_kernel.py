@@ -8,7 +8,7 @@ For compiled callers: `tick_compiled(*shared, *own, *work, q, qd, distances, age
     q, qd    measured (n,) [rad, rad/s]
     distances, ages   (k,) [m, s]; (0,) where points are given
     points   (p, 3) [m], p no more than `new_work` was told; (0, 3) where distances are given
-    how      `DISTANCES`, `POINTS` or `NOTHING` of the two
+    how      `DISTANCES`, `POINTS` or `NOTHING` of the two, see `code`
 
 A caller that is an `entry` names `tick_kernel, *tick_kernel.USES` among what it uses. The tick returns the status, `OK`
 to `FAULT`; everything else stands in the robot's blocks then, see `pack.own_of`.
