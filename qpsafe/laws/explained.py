@@ -129,13 +129,14 @@ def paper_hierarchy(s: Solved, kept: int) -> Packed:
     return hierarchy(s, 1, regimes_of(tasks, s.qd0, spared=1)[kept])
 
 
-def weighted_level(s: Solved, importance: Array, activations: Sequence[float], _: int) -> Packed:
+def weighted_level(s: Solved, importance: Array, activations: Sequence[float], kept: int) -> Packed:
     """The weighted sum as one level.
 
     Args:
         s: What there is.
         importance: w_1, ..., w_N, w_E.
         activations: (tasks,).
+        kept: Always 0: there is one problem.
     """
     rows, n = len(s.b) + len(s.qd0), len(s.qd0)
     matrix, target = np.empty((rows, n)), np.empty(rows)
