@@ -36,6 +36,7 @@ class Shared(NamedTuple):
     first_event: Any  # (T + 1,)
     endless: Any  # joints that turn without end
     nowhere: Any  # rows and body of the way back through the joints (n + 2,): zeros, then n
+    importance: Any  # weights of a weighted law, w_1, ..., w_N, w_E (N + 1,)
 
 
 class Own(NamedTuple):

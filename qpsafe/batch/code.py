@@ -11,8 +11,9 @@ HEADS = 12
 (DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,
  WAY_DAMPING, WAY_DAMPING_TIME, WAY_GAIN, RETURN_SPEED) = range(17)  # fmt: skip
 #: Whole ones: whether paths are suspended at all, looks of the stall watch and ticks between two, ticks between two
-#: looks at units, how many spots may be out of order, rows of the largest level, of a way back through the joints too.
-ENABLED, PATIENCE, EVERY, UNITS_EVERY, MOST, LARGEST, LARGEST_WAY = range(7)
+#: looks at units, how many spots may be out of order, rows of the largest level, of a way back through the joints too,
+#: and the law's number in `qpsafe.laws.kinds`.
+ENABLED, PATIENCE, EVERY, UNITS_EVERY, MOST, LARGEST, LARGEST_WAY, LAW = range(8)
 #: Kinds of trajectories: one pose; at rest after its end; begun again at its end; known up to its end.
 FIXED, RESTS, CYCLES, ENDS = range(4)
 #: Floats of a knot of a trajectory: pose, twist, turn to the next knot and the turn's rate there.

@@ -35,7 +35,7 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(floats, at[8], (K,)),
         view(floats, at[9], (K, 28)),
         view(floats, at[10], (E,)),
-        view(integers, at[11], (7,)),
+        view(integers, at[11], (8,)),
         view(integers, at[12], (L,)),
         view(integers, at[13], (N,)),
         view(integers, at[14], (R,)),
@@ -47,6 +47,7 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(integers, at[20], (T + 1,)),
         view(integers, at[21], (n,)),
         view(integers, at[22], (n + 2,)),
+        view(floats, at[23], (N + 1,)),
     )
 
 

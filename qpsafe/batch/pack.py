@@ -16,6 +16,7 @@ from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.hqp.own.state import workspace
 from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.kinds import OTHER, WEIGHTED, kind_of, numbers_of
 from qpsafe.limits import JointLimits
 from qpsafe.pipeline.sense import Sense
 from qpsafe.recovery.recovery import RecoveryRules
@@ -70,11 +71,10 @@ def why_not(controller: SafetyController) -> str:
         controller.activation,
         controller.recovery_rules,
     )
-    plain_law = type(law) is HierarchicalLaw and law.solver in (None, "own")
+    kind, solver = kind_of(law, len(controller.tasks)), getattr(law, "solver", None)
     reasons = {
-        "the law is of another making": type(law) is not HierarchicalLaw,
-        "the law has another solver than the own one": type(law) is HierarchicalLaw and not plain_law,
-        "the law's projection is the paper's": plain_law and law.projection != "strict" and len(controller.tasks) > 1,  # type: ignore[attr-defined]
+        "the law has another solver than the own one": kind == OTHER and solver not in (None, "own"),
+        "the law is of another making": kind == OTHER,
         "the field is of another making": type(controller.field) is not DangerField,
         "the evasion is of another making": type(controller.evasion) is not Evasion,
         "there are no limits": limits == "off",
@@ -119,7 +119,7 @@ def pack(controller: SafetyController, horizon: float = HORIZON) -> Packed:
     counts = [len(task.rows) for task in tasks]  # type: ignore[attr-defined]
     rows = sum(counts)
     spots = 0 if controller.spots is None else len(controller.spots)
-    solver = [len(block) for block in workspace(n, max(rows, n) + n, max(rows, n))]
+    solver = [len(block) for block in workspace(n, max(rows, n) + n, rows + n)]
     sizes = np.array(
         (n, len(tasks), len(paths), spots, rows, len(controller.activation.levels), sum(len(p.times) for p in paths),
          sum(len(p.events) for p in paths), robot.memory, len(robot.wire_frames), *solver), dtype=np.int64,
@@ -149,8 +149,8 @@ def _numbers(controller: SafetyController, paths: list[Path]) -> dict[str, Any]:
     robot, rules, law, limits, dt = (
         controller.robot, controller.recovery_rules, controller.law, controller.limits, controller.dt,
     )  # fmt: skip
-    assert isinstance(law, HierarchicalLaw)
     assert isinstance(limits, JointLimits)
+    damping, damping_time, importance = numbers_of(law, len(controller.tasks))
     way = HierarchicalLaw()
     spots = controller.spots
     farthest = controller._units.farthest if spots is not None else np.zeros(0)
@@ -158,7 +158,7 @@ def _numbers(controller: SafetyController, paths: list[Path]) -> dict[str, Any]:
         "numbers": (
             dt, controller.activation.suspend_above, dt / rules.ramp, controller.recovery.kept, rules.speed,
             rules.angular_speed, rules.joint_speed, rules.shortest, rules.tolerance, BEHIND * rules.tolerance,
-            controller.rules.speed_cap, law.damping, law.damping_time, way.damping, way.damping_time,
+            controller.rules.speed_cap, damping, damping_time, way.damping, way.damping_time,
             JointTask(FixedJoints(robot.home)).gain, limits.return_speed,
         ),
         "levels": [(level.start, level.end, level.delta, level.epsilon) for level in controller.activation.levels],
@@ -171,6 +171,7 @@ def _numbers(controller: SafetyController, paths: list[Path]) -> dict[str, Any]:
         "times": np.concatenate([path.times for path in paths]),
         "knots": np.concatenate([path.knots for path in paths]),
         "event_times": [time for path in paths for time, _ in path.events],
+        "importance": importance,
     }  # fmt: skip
 
 
@@ -180,10 +181,12 @@ def _whole(controller: SafetyController, paths: list[Path], trajectories: list[A
     stall, sensing = controller._stall, controller.sensing
     counts = [len(task.rows) for task in tasks]  # type: ignore[attr-defined]
     places = {id(trajectory): k for k, trajectory in enumerate(trajectories)}
+    kind = kind_of(controller.law, len(tasks))
     return {
         "whole": (
             rules.enabled, stall.patience, stall.every, controller._units.every,
-            0 if sensing is None else sensing.health.most, max(n, *counts), n,
+            0 if sensing is None else sensing.health.most,
+            sum(counts) + n if kind == WEIGHTED else max(n, *counts), n, kind,
         ),
         "counts": controller.activation.counts,
         "bodies": [robot.mounting(task.frame)[0] for task in tasks],  # type: ignore[attr-defined]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,10 @@ from qpsafe.hqp.own import regimes
 from qpsafe.hqp.own.solver import MODULES
 from qpsafe.laws import damping, hierarchical
 from qpsafe.laws.hierarchical import weigh_compiled
+from qpsafe.laws.kinds import STRICT
 from qpsafe.limits import box_into
-from qpsafe.pipeline import braking, resolve_kernel, sense_kernel
+from qpsafe.pipeline import braking, law_kernel, resolve_kernel, sense_kernel
+from qpsafe.pipeline.law_kernel import law_compiled
 from qpsafe.pipeline.resolve_kernel import given, parts, resolve_tick
 from qpsafe.pipeline.sense_kernel import (
     ENDS as WIRE_ENDS,
@@ -53,7 +55,7 @@ _parts, _given = inline(parts), inline(given)
 USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
     limits_module, braking, resolve_kernel, sense_kernel, stall, steps, kinematics, speed_cap, units, clik, offset,
-    detection, readings, push, damping, regimes, *push.USES, *readings.USES, *MODULES,
+    detection, readings, push, damping, regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 
 
@@ -152,11 +154,19 @@ def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[f
             w.floats[a] = 0.0
         for a in range(w.integers.shape[0]):
             w.integers[a] = 0
-        return _resolve_tick(
+        kind = p.whole[code.LAW]
+        excess, worst = _resolve_tick(
             s.q, s.qd, memory, supports, k, p.bodies, p.placements, p.rows, w.given, limits, dt,
-            return_speed, p.numbers[code.DAMPING], p.numbers[code.DAMPING_TIME], w.solver, w.solver_whole,
-            p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.floats, w.integers, w.command,
+            return_speed, p.numbers[code.DAMPING] if kind == STRICT else nan, p.numbers[code.DAMPING_TIME], w.solver,
+            w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.floats, w.integers, w.command,
         )  # fmt: skip
+        if kind != STRICT:
+            excess, worst = law_compiled(
+                kind, p.numbers[code.DAMPING], p.numbers[code.DAMPING_TIME], p.importance, s.activations, dt, w.given,
+                w.solver, w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.floats,
+                w.integers, w.command,
+            )  # fmt: skip
+        return excess, worst
     # back through the joints: one task on all of them, whose rows stand already
     gains, standing, _, _, weights, _, qd0 = _given(w.way_given, n, 1)
     gains[0], standing[0] = p.numbers[code.WAY_GAIN], 1.0

@@ -136,7 +136,7 @@ def weighted_level(s: Solved, importance: Array, activations: Sequence[float], k
         s: What there is.
         importance: w_1, ..., w_N, w_E.
         activations: (tasks,).
-        kept: Not asked: there are no regimes.
+        kept: Always 0: there is one problem.
     """
     rows, n = len(s.b) + len(s.qd0), len(s.qd0)
     matrix, target = np.empty((rows, n)), np.empty(rows)

@@ -131,11 +131,15 @@ def test_bad_points_of_one_robot_are_its_own(controller: Any) -> None:
     assert tick.status.tolist() == [2, 0, 2]
 
 
+class MyLaw(qpsafe.HierarchicalLaw):
+    """Of another making."""
+
+
 @pytest.mark.parametrize(
     "options",
     [
-        {"law": qpsafe.HierarchicalLaw("paper")},
-        {"law": qpsafe.WeightedLaw()},
+        {"law": MyLaw()},
+        {"law": qpsafe.WeightedLaw(solver="daqp")},
         {"barrier": qpsafe.DangerBarrier(30.0)},
         {"limits": "off"},
     ],

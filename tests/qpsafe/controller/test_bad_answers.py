@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import qpsafe
+from qpsafe.hqp.own import regimes
 from qpsafe.tasks.clik import Clik
 
 SPOILT: dict[str, Any] = {
@@ -135,7 +136,10 @@ def test_activations_that_are_none_are_a_fault(run: Any, law: Any, answer: Any) 
     assert loop.step().status == "ok"
 
 
-def test_a_task_whose_rows_change_for_ever_does_not_fill_the_memory(run: Any, irb140: Any) -> None:
+def test_a_task_whose_rows_change_for_ever_does_not_fill_the_memory(
+    run: Any, irb140: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(regimes, "_layouts", {})  # whatever tests before have left in it
     rows = [0]
 
     class Own(qpsafe.PositionTask):
