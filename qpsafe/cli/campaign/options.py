@@ -26,7 +26,9 @@ Robot = Annotated[str | None, typer.Option(help="A bundled robot, or the path of
 Motions = Annotated[str | None, typer.Option(help="hold, line, pick or programs' files, separated by commas.")]
 Sight = Annotated[str | None, typer.Option("--sensor", help="What they see by: ideal, sharp or perfect.")]
 Lag = Annotated[float | None, typer.Option(help="Of the servos [s]; 0: they follow perfectly.")]
-People = Annotated[Path | None, typer.Option(help="A TOML file with a model of people, or stories.")]
+People = Annotated[
+    Path | None, typer.Option(help="A TOML file with a model of people or a story, or a folder of these.")
+]
 Workers = Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")]
 Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler, which takes the place of --workers.")]
 

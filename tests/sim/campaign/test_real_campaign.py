@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import qpsafe.sim
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.sim.campaign.plan import Plan
@@ -72,3 +73,15 @@ def test_a_controller_that_moves_towards_people_is_caught() -> None:
     assert any("worse than no control" in text for text in found["findings"])
     good = summary(run_campaign(dataclasses.replace(plan, controllers=("none", "default"))))
     assert good["findings"] == []
+
+
+def test_people_may_be_stories_of_the_users(tmp_path: Path) -> None:
+    """A folder of them: trials take one and vary it."""
+    story = (Path(qpsafe.sim.__path__[0]) / "experiments" / "fast-person.toml").read_text(encoding="utf-8")
+    for speed in ("1.0", "2.0"):
+        text = story.replace("speed = 2.0", f"speed = {speed}", 1)
+        (tmp_path / f"at-{speed}.toml").write_text(text, encoding="utf-8")
+    plan = Plan(trials=2, controllers=("none",), motions=("hold",), people=str(tmp_path))
+    found = run_campaign(plan).columns
+    assert found["contact"].all()  # they walk up to the robot's foot
+    assert found["distance_time"][0] != found["distance_time"][1]
