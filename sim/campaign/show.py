@@ -6,7 +6,7 @@ import csv
 import os
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -81,14 +81,18 @@ def show(
         if progress is not None:
             progress(k + 1, len(met.tracks))
 
-    film, files = _film(met, out / f"{name}.mp4", notice) if video else None, (out / f"{name}.csv",)
-    if film is None:
-        run = recorded(plan, met, controller, note)
-    else:
-        with film as observe:
-            run = recorded(plan, met, controller, lambda *tick: (note(*tick), observe(*tick)))
-        files = (out / f"{name}.mp4", *files)
-    _write_table(files[-1], met, run, answers)
+    video_file, table_file = out / f"{name}.mp4", out / f"{name}.csv"
+    film = _film(met, video_file, notice) if video else None
+    with nullcontext() if film is None else film as observe:
+
+        def seen(k: int, q: Array, tick: Tick) -> None:
+            note(k, q, tick)
+            if observe is not None:
+                observe(k, q, tick)
+
+        run = recorded(plan, met, controller, seen)
+    _write_table(table_file, met, run, answers)
+    files = (table_file,) if film is None else (video_file, table_file)
     return Shown(measures(plan, met, controller, recorded(plan, met, controller)), files)
 
 

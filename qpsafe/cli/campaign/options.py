@@ -43,6 +43,7 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
     Raises:
         ConfigurationError: Names the option, or the file with the line.
     """
+    from qpsafe.robot.loader import load_robot
     from qpsafe.sim.campaign.plan import Plan, load_plan
 
     plan = Plan() if file is None else file if isinstance(file, Plan) else load_plan(file)
@@ -53,9 +54,13 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
     if "people" in typed:
         typed["people"] = str(typed["people"])
     try:
-        return replace(plan, **typed)
+        made = replace(plan, **typed)
     except ConfigurationError as wrong:
         raise ConfigurationError("qpsafe campaign", f"--{wrong.key}", wrong.value, wrong.expected) from None
+    if load_robot(made.robot).spots_path is None:
+        expected = "a robot with distance sensors (spots.toml)"
+        raise ConfigurationError("qpsafe campaign", "--robot", made.robot, expected)
+    return made
 
 
 @contextmanager

@@ -75,7 +75,7 @@ def _box(axis: Axes, found: dict[str, Any], name: str, colour: str, label: str) 
     size = 1.0 / least - 1.0 / most, high - low
     axis.add_patch(Rectangle((1.0 / most, low), *size, facecolor=colour, alpha=0.22, linewidth=0))
     axis.add_patch(Rectangle((1.0 / most, low), *size, fill=False, edgecolor=colour, linewidth=0.8))
-    axis.plot([x], [y], "o", color=colour, markersize=4, label=label)
+    axis.plot([x], [y], "o", color=colour, markersize=4, label=label, clip_on=False, zorder=3)
 
 
 def distance_figure(rows: dict[str, Columns]) -> Figure:
@@ -102,6 +102,8 @@ def energy_figure(rows: dict[str, Columns]) -> Figure:
     Args:
         rows: Of each controller.
     """
+    from matplotlib.ticker import LogLocator
+
     figure, axes = _figure(1, 2, 7.6, 3.4)
     labels = ("energy of the contact [J]", "energy / limit of the touched region")
     for axis, key, label in zip(axes, ("energy", "energy_share"), labels, strict=True):
@@ -114,8 +116,10 @@ def energy_figure(rows: dict[str, Columns]) -> Figure:
         axis.set(xlabel=label, ylabel="share of trials with as much [%]")
         if any((mine[key] > 0.0).any() for mine in rows.values()):
             axis.set(xscale="log", yscale="log")
-            axis.yaxis.set_major_formatter("{x:g}")
-            axis.xaxis.set_major_formatter("{x:g}")
+            for scale, labelled in ((axis.xaxis, (1.0,)), (axis.yaxis, (1.0, 2.0, 5.0))):
+                scale.set_major_locator(LogLocator(subs=labelled))
+                scale.set_major_formatter("{x:g}")
+                scale.set_minor_formatter("")
     axes[1].axvline(1.0, color="#c0392b", linewidth=0.8)
     _legend_below(figure, axes[0], 4)
     return figure

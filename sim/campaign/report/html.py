@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 
@@ -31,24 +32,21 @@ def joined(parts: Iterable[str]) -> Html:
     return Html("".join(part if isinstance(part, Html) else escape(part) for part in parts))
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], text: int = 1) -> Html:
-    """A table that scrolls sideways where the screen is too narrow.
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], text: Collection[int] = (0,)) -> Html:
+    """A table that scrolls sideways where the screen is too narrow; its first column stays.
 
     Args:
         headings: Of the columns.
         rows: Their cells.
-        text: How many columns at the left are text; the others are numbers.
+        text: Numbers of the columns that are text; the others are numbers.
     """
-    heads = joined(element("th", cell, scope="col") for cell in headings)
+    kinds = ["text" if k in text else "number" for k in range(len(headings))]
+    heads = joined(element("th", cell, scope="col", class_=kind) for cell, kind in zip(headings, kinds, strict=True))
     lines = (
         element(
             "tr",
-            *(
-                element("th", cell, scope="row")
-                if k == 0
-                else element("td", cell, class_="text" if k < text else "number")
-                for k, cell in enumerate(row)
-            ),
+            element("th", _breakable(row[0]), scope="row"),
+            *(element("td", cell, class_=kind) for cell, kind in zip(row[1:], kinds[1:], strict=True)),
         )
         for row in rows
     )
@@ -56,31 +54,42 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], text: int = 1)
     return element("div", inner, class_="wide", tabindex="0")
 
 
+def _breakable(name: str) -> Html:
+    """A name that may go on in another line after its underscores, slashes and colons."""
+    return Html(re.sub(r"([_/:])", r"\1<wbr>", escape(name)))
+
+
 STYLE = Html(
     """
 :root { color-scheme: light; --line: #d6d9dd; --soft: #5b6570; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c2126; background: #fff; margin: 0 auto; padding: 1.2rem;
-  max-width: 62rem; overflow-wrap: anywhere; }
+  max-width: 74rem; overflow-wrap: anywhere; }
 h1 { font-size: 1.6rem; margin: 0 0 .3rem; } h2 { font-size: 1.2rem; margin: 2.2rem 0 .4rem; }
-p, ul { margin: .4rem 0 .8rem; max-width: 46rem; } .soft, small { color: var(--soft); }
+h2 { break-after: avoid; } p, ul { margin: .4rem 0 .8rem; max-width: 46rem; } .soft, small { color: var(--soft); }
 .wide { overflow-x: auto; margin: .6rem 0; overflow-wrap: normal; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
-th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-thead th { vertical-align: bottom; border-bottom: 2px solid #9aa3ac; }
-td.number { text-align: right; white-space: nowrap; } tbody th { white-space: nowrap; }
+table { border-collapse: separate; border-spacing: 0; font-variant-numeric: tabular-nums; font-size: .85rem; }
+th, td { padding: .25rem .5rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
+thead th { vertical-align: bottom; border-bottom: 2px solid #9aa3ac; } .number { text-align: right; }
+td.number, td code, tbody th { white-space: nowrap; }
+th:first-child { position: sticky; left: 0; background: #fff; }
 td small { display: block; white-space: nowrap; }
 figure { margin: .8rem 0; overflow-x: auto; }
-figure svg { width: 100%; min-width: 30rem; max-width: 50rem; height: auto; display: block; }
+figure svg { width: 100%; min-width: 34rem; max-width: 50rem; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: .85rem; max-width: 46rem; }
 code { font: .82rem ui-monospace, monospace; background: #f2f4f6; padding: .05rem .25rem; border-radius: 3px; }
 details { margin: .5rem 0; } summary { cursor: pointer; font-weight: 600; }
 .fault { border-left: 4px solid #c0392b; background: #fdf0ee; padding: .5rem .8rem; }
 .fine { border-left: 4px solid #2a8c3c; background: #f0f7f1; padding: .5rem .8rem; }
 @page { size: A4 landscape; margin: 12mm; }
-@media print { body { max-width: none; padding: 0; font-size: 9.5pt; } .wide { overflow: visible; }
-  table { font-size: 6pt; } th, td { padding: .1rem .25rem; } figure, tr { break-inside: avoid; }
-  thead { display: table-header-group; } }
+@media (max-width: 40rem) { body { padding: .8rem; } h1 { font-size: 1.35rem; } ul { padding-left: 1.2rem; }
+  tbody th { white-space: normal; } }
+@media print { body { max-width: none; padding: 0; font-size: 9.5pt; } .wide, figure { overflow: visible; }
+  * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } th:first-child { position: static; }
+  table { font-size: 6.5pt; } th, td { padding: .1rem .25rem; } table code { font-size: inherit; padding: 0; }
+  td.text:not(:has(code)), td.number { max-width: 22rem; } figure, tr, .fault, .fine { break-inside: avoid; }
+  figure svg { min-width: 0; max-width: 16cm; } thead { display: table-header-group; }
+  details::details-content { content-visibility: visible; block-size: auto; } }
 """
 )
 

@@ -75,8 +75,8 @@ def _sections(results: Results, found: dict[str, Any]) -> Iterator[Html]:
     yield element("p", _size(found["statistics"]))
     yield from _definitions()
     yield element("h2", "The plan")
-    yield table(("key", "value"), [(key, _words(value)) for key, value in found["plan"].items()], text=2)
-    yield table(("made with", "version"), list(found["versions"].items()), text=2)
+    yield table(("key", "value"), [(key, _words(value)) for key, value in found["plan"].items()], range(2))
+    yield table(("made with", "version"), list(found["versions"].items()), range(2))
     yield element("p", _times(found["engine"]), class_="soft", id="times")
 
 
@@ -107,7 +107,7 @@ def _compared(found: dict[str, Any], reference: str) -> Html:
     lines: dict[str, list[str]] = {}
     for item in (item for item in found["comparisons"] if item["reference"] == reference):
         value, limits = MEASURES[item["measure"]].difference(item)
-        small = element("small", limits, element("br"), f"p = {item['p_holm']:.2g}")
+        small = joined((element("small", limits), element("small", f"p = {item['p_holm']:.2g}")))
         head = element("strong", value) if item["p_holm"] < LEVEL else value
         lines.setdefault(item["controller"], []).append(joined((head, small)))
     caption = (
@@ -133,8 +133,7 @@ def _worst(plan: Plan, name: str, cases: list[dict[str, Any]]) -> Html:
     lines = [
         (
             str(case["trial"]),
-            case["contact_class"],
-            case["contact_region"] or "-",
+            *((case["contact_class"], case["contact_region"]) if case["contact"] else "--"),
             case["motion"],
             f"{1e3 * case['distance']:.0f}",
             f"{case['closing_speed']:.2f}" if case["contact"] else "-",
@@ -154,7 +153,7 @@ def _worst(plan: Plan, name: str, cases: list[dict[str, Any]]) -> Html:
         "to see it again",
     )
     opened = {"open": ""} if name == "default" else {}
-    return element("details", element("summary", name), table(heads, lines, text=4), **opened)
+    return element("details", element("summary", name), table(heads, lines, (0, 1, 2, 3, 7)), **opened)
 
 
 def _size(said: dict[str, Any]) -> str:
@@ -165,10 +164,10 @@ def _definitions() -> Iterator[Html]:
     shares = [(m.title, m.name, "trials", m.meaning) for m in SHARES]
     figures = [(m.title, m.name, m.unit, m.meaning) for m in FIGURES]
     heads = ("measure", "in JSON", "shown in", "definition")
-    yield element("details", element("summary", "Measures"), table(heads, shares + figures, text=4))
+    yield element("details", element("summary", "Measures"), table(heads, shares + figures, range(4)))
     columns = [(c.name, c.unit, c.meaning) for c in COLUMNS]
     yield element(
-        "details", element("summary", "Columns of a row"), table(("column", "unit", "definition"), columns, text=3)
+        "details", element("summary", "Columns of a row"), table(("column", "unit", "definition"), columns, range(3))
     )
 
 
