@@ -32,15 +32,33 @@ class Clocked:
 
     def __init__(self, trajectory: Trajectory) -> None:
         self._trajectory = trajectory
-        self.time, self.rate = 0.0, 0.0
+        self.time, self.rate = 0.0, 1.0
+        self._passed = 0  # events
+        self._waiting = False  # at one
 
     def sample(self, _: float) -> Any:
         """The reference of now, whatever time is asked for."""
-        return self.full().slowed(self.rate)
+        return self.full().slowed(0.0 if self._waiting else self.rate)
 
     def full(self) -> Any:
         """The reference at the full rate."""
         return self._trajectory.sample(self.time)
+
+    def advance(self, dt: float, met: bool) -> None:
+        """Let time pass; at an event only when the tasks are met, as a controller's own clock does.
+
+        Args:
+            dt: Tick [s].
+            met: Whether they are.
+        """
+        ahead = self.time + self.rate * dt
+        event = self._trajectory.event(self._passed) if hasattr(self._trajectory, "event") else None
+        if event is not None and event.time <= ahead:
+            self._waiting = not met
+            if self._waiting:
+                return
+            self._passed += 1
+        self.time = ahead
 
 
 class PathScaling:
@@ -57,6 +75,7 @@ class PathScaling:
         self._monitor = Monitor(station, separation)
         self._robot, self._dt = station.robot, self._controller.dt
         self._speed = max(station.speed, 0.05)
+        self._tolerance = self._controller.recovery_rules.tolerance
 
     def step(self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None) -> Tick:
         """One tick, as `SafetyController.step`.
@@ -82,7 +101,7 @@ class PathScaling:
         fall = separation.deceleration * self._dt / self._speed
         clock.rate = min(max(allowed, clock.rate - fall), clock.rate + self._dt / RAMP)
         tick = self._controller.step(q, qd, points=_NOBODY)
-        clock.time += clock.rate * self._dt
+        clock.advance(self._dt, all(float(np.linalg.norm(error)) <= self._tolerance for error in tick.errors))
         phase = FOLLOWING if clock.rate > 0.0 else SUSPENDED
         return replace(tick, path_time=clock.time, phase=phase, points=self._monitor.seen)
 

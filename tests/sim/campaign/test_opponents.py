@@ -78,7 +78,7 @@ def test_without_people_all_do_the_same_work() -> None:
     nobody = PersonTracks.of((), [()] * 400, DT)
     runs = {name: record(place, opponent(name), Senses(place, nobody, "ideal", 0), 400) for name in names()}
     for name, run in runs.items():
-        assert run.path_time[-1] == pytest.approx(runs["none"].path_time[-1], abs=0.11), name  # scaling sets out gently
+        assert run.path_time[-1] == pytest.approx(runs["none"].path_time[-1], abs=0.02), name
         if name in ("stop", "default", "strict", "velocities"):
             assert np.array_equal(run.q, runs["none"].q), name
 
