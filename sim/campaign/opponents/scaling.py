@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,17 +44,17 @@ class Clocked:
         """The reference at the full rate."""
         return self._trajectory.sample(self.time)
 
-    def advance(self, dt: float, met: bool) -> None:
+    def advance(self, dt: float, met: Callable[[], bool]) -> None:
         """Let time pass; at an event only when the tasks are met, as a controller's own clock does.
 
         Args:
             dt: Tick [s].
-            met: Whether they are.
+            met: Tells whether they are.
         """
         ahead = self.time + self.rate * dt
         event = self._trajectory.event(self._passed) if hasattr(self._trajectory, "event") else None
         if event is not None and event.time <= ahead:
-            self._waiting = not met
+            self._waiting = not met()
             if self._waiting:
                 return
             self._passed += 1
@@ -101,9 +101,10 @@ class PathScaling:
         fall = separation.deceleration * self._dt / self._speed
         clock.rate = min(max(allowed, clock.rate - fall), clock.rate + self._dt / RAMP)
         tick = self._controller.step(q, qd, points=_NOBODY)
-        clock.advance(self._dt, all(float(np.linalg.norm(error)) <= self._tolerance for error in tick.errors))
-        phase = FOLLOWING if clock.rate > 0.0 else SUSPENDED
-        return replace(tick, path_time=clock.time, phase=phase, points=self._monitor.seen)
+        clock.advance(self._dt, lambda: all(float(np.linalg.norm(e)) <= self._tolerance for e in tick.errors))
+        tick.phase = FOLLOWING if clock.rate > 0.0 else SUSPENDED
+        tick.path_time, tick.points = clock.time, self._monitor.seen
+        return tick
 
 
 _NOBODY = np.empty((0, 3))

@@ -59,7 +59,8 @@ class StopOnly:
         else:
             free = bool((gaps.rows @ self._tick.reference.qd <= self._monitor.separation.speed(gaps.distances)).all())
         if not self._stopping and free:
-            self._tick = replace(self._controller.step(q, qd, points=_NOBODY), points=self._monitor.seen)
+            self._tick = self._controller.step(q, qd, points=_NOBODY)
+            self._tick.points = self._monitor.seen
             return self._tick
         assert self._tick is not None
         self._stopping = True
