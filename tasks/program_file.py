@@ -24,6 +24,7 @@ above = 0.1                       # m; 0 by default
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,13 @@ def load_program(path: str | Path, robot: Robot) -> Program:
             cycle that does not close.
     """
     text = TomlText.read(Path(path), ProgramError)
+    return _program(text.text, text.path, robot)
+
+
+@lru_cache(maxsize=8)
+def _program(said: str, path: str | Path, robot: Robot) -> Program:
+    """What a file says, for a robot. Neither it nor a program ever changes: the last ones are not followed once more."""
+    text = TomlText(said, path, ProgramError)
     return _Builder(text, text.checked(ProgramFile, lambda before, key: key not in _KINDS), robot).program()
 
 

@@ -106,7 +106,7 @@ def candidate_nodes(
     patches = [_Patch(robot, region, sensor, sight) for region in robot.regions]
     if spacing is None:
         # the area that looks out, by a coarse lattice, says what to expect
-        area = sum(len(patch.fine[0]) for patch in patches) * COARSE**2
+        area = sum(patch.coarse for patch in patches) * COARSE**2
         spacing = _spacing_for(patches, wanted, float(np.sqrt(area / wanted)), progress)
     elif np.isfinite(spacing) and 1e-3 <= spacing <= 1.0:
         for patch in patches:
@@ -131,30 +131,47 @@ class _Patch:
         near = (surface.skin.max(axis=1) >= region.lower) & (surface.skin.min(axis=1) <= region.upper)
         self.surface = Surface(surface.skin[near.all(axis=1)], surface.body)
         self.normals = self.surface.normals()
-        self.fine = self.usable_lattice(COARSE)
-        if not len(self.fine[0]):
+        self.coarse = len(self.usable_lattice(COARSE)[0])
+        if self.coarse == 0:
             expected = "a box with some surface of the link in it that does not look at the link itself"
             where = f"regions ({region.name}).lower"
             raise RobotFileError(robot.folder / "robot.toml", where, region.lower.tolist(), expected)
 
-    def usable_lattice(self, spacing: float) -> tuple[Array, Array]:
-        """Lattice points in the box that look out, and their normals, (k, 3) each."""
+    def lattice(self, spacing: float) -> tuple[Array, Array]:
+        """Lattice points in the box, and their normals, (k, 3) each."""
         points, normals = lattice(self.surface.skin, self.normals, self.box, spacing)
         inside = ((points >= self.box[0] - 1e-9) & (points <= self.box[1] + 1e-9)).all(axis=1)
-        points, normals = points[inside], normals[inside]
-        free = looks_out(points, normals, self.surface.body, self.reach)
-        points, normals = points[free], normals[free]
-        clear = self.sight.clear(self.region.frame, points, normals, self.region.self_sight)
-        return points[clear], normals[clear]
+        return points[inside], normals[inside]
+
+    def usable(self, points: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which points look out and see no other part of the robot, (k,)."""
+        usable = looks_out(points, normals, self.surface.body, self.reach)
+        at = self.region
+        usable[usable] = self.sight.clear(at.frame, points[usable], normals[usable], at.self_sight)
+        return usable
+
+    def usable_lattice(self, spacing: float) -> tuple[Array, Array]:
+        """Lattice points that can be used, and their normals, (k, 3) each."""
+        points, normals = self.lattice(spacing)
+        usable = self.usable(points, normals)
+        return points[usable], normals[usable]
 
     def refine(self, pitch: float) -> None:
-        """Lay the fine lattice."""
-        self.fine = self.usable_lattice(max(pitch, 0.001))
+        """Lay the fine lattice. Which of its points can be used is found when a grid has a gap there."""
+        self.fine = self.lattice(max(pitch, 0.001))
+        self.known, self.use = np.zeros((2, len(self.fine[0])), dtype=np.bool_)
 
     def grid(self, spacing: float) -> tuple[Array, Array]:
         """Nodes and normals at a spacing, (k, 3) each."""
-        coarse = self.usable_lattice(spacing)
-        points, normals = (np.concatenate(pair) for pair in zip(coarse, self.fine, strict=True))
+        points, normals = self.usable_lattice(spacing)
+        kept = thin_out(points, normals, NEAREST * spacing)
+        points, normals = points[kept], normals[kept]
+        # what is near a node that is kept anyhow is thinned out, usable or not; `thin_out` decides what is on the edge
+        gaps, ways = self.fine[0][:, None] - points, self.fine[1] @ normals.T
+        near = ((gaps**2).sum(axis=-1) < (1.0 - 1e-9) * (NEAREST * spacing) ** 2) & (ways > 1e-8)
+        news = np.flatnonzero(~near.any(axis=1) & ~self.known)
+        self.known[news], self.use[news] = True, self.usable(self.fine[0][news], self.fine[1][news])
+        points, normals = (np.concatenate((a, b[self.use])) for a, b in zip((points, normals), self.fine, strict=True))
         kept = thin_out(points, normals, NEAREST * spacing)
         return points[kept], normals[kept]
 

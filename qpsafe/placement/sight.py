@@ -147,6 +147,8 @@ class SelfSight:
             meets = ((distance >= 0.0) & (distance < reach)).reshape(-1, RIM + 1).any(axis=1)
             times[some[meets]] += 1
             left = left[times[left] <= most]
+            if not len(left):
+                break
         clear = np.zeros(len(points), dtype=np.bool_)
         clear[left] = True
         return clear

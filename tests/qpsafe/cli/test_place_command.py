@@ -18,17 +18,20 @@ from qpsafe.robot.robot import Robot
 
 @pytest.fixture(autouse=True)
 def _nodes_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same candidates for all commands here: finding them takes most of a command's time."""
+    """The same candidates for all commands here, at a spacing that is known to give 40: to find it takes longer than
+    all the rest, and is tested with `candidate_nodes`.
+    """
     monkeypatch.setattr(candidates, "candidate_nodes", _found)
 
 
 @cache
-def _found_by_name(name: str, wanted: int) -> candidates.Candidates:
-    return _find(qpsafe.load_robot(name), wanted)
+def _found_by_name(name: str) -> candidates.Candidates:
+    return _find(qpsafe.load_robot(name), spacing=0.1265)
 
 
 def _found(robot: Robot, wanted: int, **_: object) -> candidates.Candidates:
-    return _found_by_name(robot.name, wanted)
+    assert wanted == 40
+    return _found_by_name(robot.name)
 
 
 _find = candidates.candidate_nodes

@@ -46,19 +46,33 @@ def same(ones: list[Any], others: list[Any]) -> None:
         assert np.array_equal(one.cdf_n, other.cdf_n, equal_nan=True)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.fixture(scope="module", params=LAWS)
+def law(request: pytest.FixtureRequest) -> Any:
+    return LAWS[request.param]
+
+
+@pytest.fixture(scope="module")
+def whole(irb140: Any, law: Any) -> list[Any]:
+    """All ticks of a controller that stays."""
+    return drive(made(irb140, law), 0, 125, irb140.home, np.zeros(6))
+
+
+@pytest.fixture(scope="module", params=[7, 45, 65])
+def part(irb140: Any, law: Any, request: pytest.FixtureRequest) -> tuple[Any, int, Any]:
+    """A controller that is about to leave: nobody may drive it on; after how many ticks; its last reference."""
+    controller = made(irb140, law)
+    return controller, request.param, drive(controller, 0, request.param, irb140.home, np.zeros(6))[-1].reference
+
+
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("cut", [7, 45, 65])
-def test_a_controller_that_travels_goes_on_to_the_last_bit(irb140: Any, law: str, way: str, cut: int) -> None:
-    whole, part = made(irb140, LAWS[law]), made(irb140, LAWS[law])
-    expected = drive(whole, 0, cut + 60, irb140.home, np.zeros(6))
-    last = drive(part, 0, cut, irb140.home, np.zeros(6))[-1].reference
-    same(drive(WAYS[way](part), cut, cut + 60, last.q, last.qd), expected[cut:])
+def test_a_controller_that_travels_goes_on_to_the_last_bit(
+    whole: list[Any], part: tuple[Any, int, Any], way: str
+) -> None:
+    controller, cut, last = part
+    same(drive(WAYS[way](controller), cut, cut + 60, last.q, last.qd), whole[cut : cut + 60])
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_measurements_and_references_may_come_from_another_process(irb140: Any, law: str) -> None:
-    here, there = made(irb140, LAWS[law]), made(irb140, LAWS[law], WAYS["pickle"])
-    expected = drive(here, 0, 90, irb140.home, np.zeros(6))
+def test_measurements_and_references_may_come_from_another_process(irb140: Any, law: Any, whole: list[Any]) -> None:
+    there, expected = made(irb140, law, WAYS["pickle"]), whole[:90]
     assert {tick.phase for tick in expected} == {"following", "suspended", "recovering"}
     same(drive(there, 0, 90, irb140.home, np.zeros(6), WAYS["pickle"]), expected)

@@ -111,7 +111,7 @@ def judge(cases: Iterator[tuple[Any, str, np.ndarray, np.ndarray]], law: Any = N
 def test_arms_with_three_parallel_axes_rest_or_say_why_not(three_parallel_axes: Any) -> None:
     rng = np.random.default_rng(3)
     arms = [three_parallel_axes(rng) for _ in range(4)]
-    there, said = judge((arm, "tip", *case) for arm in arms for case in parallel_goals(rng, 8))
+    there, said = judge((arm, "tip", *case) for arm in arms for case in parallel_goals(rng, 4))
     assert there >= 0.9 * (there + said)
 
 
@@ -134,7 +134,7 @@ def test_hundreds_of_goals_on_every_bundled_robot(name: str) -> None:
 @pytest.mark.parametrize("name", bundled_robots())
 def test_bundled_robots_rest_or_say_why_not(name: str) -> None:
     robot, rng = qpsafe.load_robot(name), np.random.default_rng(4)
-    judge((robot, frame_of(robot), *case) for case in bundled_goals(rng, robot, 4))
+    judge((robot, frame_of(robot), *case) for case in bundled_goals(rng, robot, 2))
 
 
 @pytest.mark.slow

@@ -1,5 +1,9 @@
-"""The paper's first experiment, whole: what it must show, checked on the log."""
+"""The paper's first experiment: what it must show, checked on the log.
 
+Its first approach, and marked slow all three; `make demo` judges the whole one too.
+"""
+
+import math
 from dataclasses import fields, replace
 from itertools import pairwise
 
@@ -18,9 +22,11 @@ LEVEL = {"low": 0, "medium": 1, "high": 2}
 ROBOT = qpsafe.load_robot("irb140")
 
 
-@pytest.fixture(scope="module")
-def experiment() -> FixedExperiment:
-    return FixedExperiment(ROBOT)
+@pytest.fixture(scope="module", params=[1, pytest.param(3, marks=pytest.mark.slow)], ids=["first approach", "whole"])
+def experiment(request: pytest.FixtureRequest) -> FixedExperiment:
+    stage = robot_stage(ROBOT).choreography
+    stage = replace(stage, approaches=stage.approaches[: request.param])
+    return FixedExperiment(ROBOT, choreography=stage, duration=math.ceil(stage.windows[-1][1]) + 12.0)
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +44,8 @@ def norm(error: np.ndarray) -> np.ndarray:
     return np.linalg.norm(error, axis=1)
 
 
-def test_every_tick_is_fine_and_finite(log: RunLog) -> None:
-    assert len(log.time) == 15_000
+def test_every_tick_is_fine_and_finite(log: RunLog, experiment: FixedExperiment) -> None:
+    assert len(log.time) == round(experiment.duration / log.dt)
     assert set(log.status) == {"ok"}
     assert log.messages == ()
     for name in ("q_ref", "qd_ref", "q", "qd", "cdf_n", "position_error", "measured_position_error", "board_distance"):
@@ -48,7 +54,7 @@ def test_every_tick_is_fine_and_finite(log: RunLog) -> None:
 
 def test_levels_of_table_1_are_entered_and_left_one_at_a_time(log: RunLog, experiment: FixedExperiment) -> None:
     windows = experiment.windows()
-    assert len(windows) == 3
+    assert len(windows) == len(experiment.choreography.approaches)
     for start, end in windows:
         # what a spot loses comes nearer for a moment before it is forgotten: short visits to the next level are no news
         names = [item.name for item in log.intervals(0.5) if item.end > start and item.start < end]
@@ -95,15 +101,15 @@ def test_robot_is_at_its_first_pose_again_without_a_wrist_flip(log: RunLog) -> N
     assert log.q_ref[-1] == pytest.approx(ROBOT.home, abs=1e-4)
 
 
-def test_shorter_run_is_the_beginning_of_the_longer_one_bit_by_bit(log: RunLog) -> None:
-    short = FixedExperiment(ROBOT, duration=6.0).run()
+def test_shorter_run_is_the_beginning_of_the_longer_one_bit_by_bit(log: RunLog, experiment: FixedExperiment) -> None:
+    short = replace(experiment, duration=6.0).run()
     n = len(short.time)
     assert (short.regime != "low").any()  # it has something to differ in
     for name in ("q_ref", "qd_ref", "q", "qd", "cdf_n", "distances", "board_distance", "euler_error"):
         assert np.array_equal(getattr(short, name), getattr(log, name)[:n]), name
 
 
-def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
+def test_recovery_phases_follow_high_danger(log: RunLog, experiment: FixedExperiment) -> None:
     for item in log.intervals():
         if item.name == "high":
             inside = (log.time >= item.start) & (log.time < item.end - 1e-9)
@@ -111,7 +117,7 @@ def test_recovery_phases_follow_high_danger(log: RunLog) -> None:
     phases = [item.name for item in intervals(log.time, log.phase, log.dt)]
     allowed = {("following", "suspended"), ("suspended", "recovering"), ("recovering", "following")}
     assert set(pairwise(phases)) <= allowed | {("recovering", "suspended")}
-    assert phases.count("following") == 4  # before, between and after three approaches
+    assert phases.count("following") == len(experiment.windows()) + 1  # before, between and after approaches
     assert phases[0] == phases[-1] == "following"
 
 
@@ -142,7 +148,7 @@ def test_the_robot_sees_itself_and_it_does_not_count() -> None:
 def test_report_tells_what_the_log_shows(log: RunLog, experiment: FixedExperiment, without: np.ndarray) -> None:
     report = summarise(log, without, experiment.windows(), ROBOT)
     assert report.kept, [check for check in report.checks if not check.kept]
-    assert len(report.regimes) >= 13
+    assert len(report.regimes) >= 1 + 4 * len(experiment.windows())
     assert report.tracking[0] < 2e-3
 
 
@@ -150,7 +156,7 @@ def test_a_shorter_run_leaves_promises_out_and_breaks_none(log: RunLog, experime
     """However early a good run ends: what did not happen is named, the rest is kept, nothing is both or neither."""
     n, nowhere, windows = len(log.time), np.zeros(len(log.time)), experiment.walk.windows
     names = None
-    for ticks in (n, 1, 2, 250, *range(1000, n, 1000)):
+    for ticks in (n, 1, 2, *range(1000, n, 1000), 250):
         parts = {f.name: getattr(log, f.name) for f in fields(log)}
         short = type(log)(
             **{k: v[:ticks] if isinstance(v, np.ndarray) and len(v) == n else v for k, v in parts.items()}
@@ -172,7 +178,7 @@ def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment
         return {check.name.split(",")[0] for check in report.checks if not check.kept}
 
     q = log.q_ref.copy()
-    q[7000:, 2] += 1e-3  # a jump
+    q[len(q) // 2 :, 2] += 1e-3  # a jump
     assert {"joint velocity limits", "joint acceleration limits"} & broken(replace(log, q_ref=q))
     assert broken(replace(log, q_ref=log.q_ref + 3.0)) == {"joint position limits"}
     assert broken(log, log.board_distance + 0.1) == {"distance to the board"}
