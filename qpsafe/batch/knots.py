@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import ceil, inf
 from typing import Any, NamedTuple
 
@@ -84,12 +85,32 @@ def path_of(trajectory: Any, dt: float, horizon: float) -> Path:
     """
     if type(trajectory) is FixedPose:
         return Path(code.FIXED, inf, np.zeros(1), _sampled(trajectory, [0.0]), ())
+    if type(trajectory) is Program:
+        return _of_program(trajectory, dt)
     if isinstance(trajectory, Program):
         kind, end = (code.CYCLES if trajectory.cycle else code.RESTS), trajectory.duration
     elif isinstance(trajectory, _ENDING):
         kind, end = code.RESTS, trajectory.duration
     else:
         kind, end = code.ENDS, horizon
+    return _knotted(trajectory, dt, kind, end)
+
+
+@lru_cache(maxsize=8)
+def _of_program(program: Program, dt: float) -> Path:
+    """A program never changes: the knots of the last ones are not made once more."""
+    return _knotted(program, dt, code.CYCLES if program.cycle else code.RESTS, program.duration)
+
+
+def _knotted(trajectory: Any, dt: float, kind: int, end: float) -> Path:
+    """A trajectory up to its end [s], with as many knots as it takes.
+
+    Args:
+        trajectory: Any that gives `Sample`s.
+        dt: Tick [s].
+        kind: What it does at its end.
+        end: [s].
+    """
     times = np.append(np.arange(ceil(end / dt - 1e-9)) * dt, end)
     knots = _sampled(trajectory, times)
     new = np.arange(len(times) - 1)  # ways between knots that nobody has looked at

@@ -15,7 +15,7 @@ from qpsafe.sim.campaign.report.summary import summary
 from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign
 
-TRIALS = 8
+TRIALS = 20
 CONTROLLERS = ("none", "stop_perfect_sight", "default")
 
 
@@ -37,7 +37,7 @@ def results() -> Results:
     return run_campaign(Plan(trials=TRIALS, controllers=CONTROLLERS, seed=500))
 
 
-def test_a_small_campaign_is_plausible(results: Results) -> None:
+def test_a_campaign_of_twenty_trials_is_plausible(results: Results) -> None:
     found = summary(results)
     assert found["findings"] == []
     assert list(found["controllers"]) == list(CONTROLLERS)
