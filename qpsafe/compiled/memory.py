@@ -9,7 +9,6 @@ from __future__ import annotations
 from math import prod
 from typing import Any
 
-import numpy as np
 from numba import types
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array, populate_array
@@ -23,7 +22,7 @@ def view(block: Any, start: int, shape: tuple[int, ...]) -> Any:
         start: Place of the first element in it.
         shape: Of the result.
     """
-    return np.reshape(block, -1)[start : start + prod(shape)].reshape(shape)
+    return block.reshape(-1)[start : start + prod(shape)].reshape(shape)
 
 
 @type_callable(view)

@@ -253,9 +253,9 @@ def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
     assert result is not None
     messages: tuple[str, ...] = ()
     if box is not None and not resolved.excess <= 1e-9:
-        beyond = np.abs(box.clip(result.qd) - result.qd) > 1e-9
         messages = box.notes(names)
-        if beyond.any():
-            clipped = ", ".join(name for name, much in zip(names, beyond, strict=True) if much)
-            messages = (*messages, "the law exceeded the limits, clipped: " + clipped)
+        lists = result.qd.tolist(), box.lower.tolist(), box.upper.tolist()
+        beyond = [name for name, v, lo, hi in zip(names, *lists, strict=True) if lo - v > 1e-9 or v - hi > 1e-9]
+        if beyond:
+            messages = (*messages, "the law exceeded the limits, clipped: " + ", ".join(beyond))
     return messages if resolved.solved else (*messages, f"law: {result.status}")
