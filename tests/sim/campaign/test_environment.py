@@ -20,7 +20,6 @@ from qpsafe.sim.campaign.gym.environment import ID, EncounterEnv, Observation
 from qpsafe.sim.campaign.gym.policies import ControllerPolicy, episode
 from qpsafe.sim.campaign.measures import measures
 from qpsafe.sim.campaign.meeting import meeting
-from qpsafe.sim.campaign.opponents.registry import opponent
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.trial import recorded
 
@@ -42,29 +41,44 @@ class Watched(ControllerPolicy):
     """Notes the joints it is told."""
 
     def __call__(self, observation: Observation) -> np.ndarray:
-        self.joints = [*getattr(self, "joints", []), (observation["q"], observation["qd"])]
+        self.joints = getattr(self, "joints", [])
+        self.joints.append((observation["q"], observation["qd"]))
         return super().__call__(observation)
 
 
-@pytest.mark.parametrize(("sensor", "lag"), [("ideal", 0.0), pytest.param("sharp", 0.02, marks=pytest.mark.slow)])
-def test_a_controllers_commands_as_actions_are_its_trial(people: str, sensor: str, lag: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "sensor", "lag"),
+    [
+        ("default", "ideal", 0.0),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("default", "sharp", 0.02), ("stop", "ideal", 0.0), ("none", "ideal", 0.02))
+        ),
+    ],
+)
+def test_a_controllers_commands_as_actions_are_its_trial(people: str, name: str, sensor: str, lag: float) -> None:
     env = EncounterEnv(motion="line", people=people, sensor=sensor, lag=lag, stop_at_contact=False)
-    policy = Watched(opponent("default").make(env.station), env.station)
-    row = episode(env, policy, 7, "default")
-    plan = Plan(motions=("line",), people=people, sensor=sensor, lag=lag, controllers=("default",))
+    policy = Watched.named(name, env.station)
+    row = episode(env, policy, 7, name)
+    plan = Plan(motions=("line",), people=people, sensor=sensor, lag=lag, controllers=(name,))
     met = meeting(plan, 7)
-    run = recorded(plan, met, "default")
+    run = recorded(plan, met, name)
     assert np.ptp(run.q, axis=0).max() > 0.05  # it moved
-    q, qd = zip(*policy.joints, strict=True)
-    assert_allclose(q, run.q, rtol=0.0, atol=1e-9)
-    assert_allclose(qd, run.qd, rtol=0.0, atol=1e-9)
-    expected = measures(plan, met, "default", run)
-    assert expected["first_sight"] < expected["simulated"]  # somebody is there to evade
+    joints = np.array(policy.joints)
+    assert_allclose(joints[:, 0], run.q, rtol=0.0, atol=1e-9)
+    assert_allclose(joints[:, 1], run.qd, rtol=0.0, atol=1e-9)
+    expected = measures(plan, met, name, run)
+    assert name == "none" or expected["first_sight"] < expected["simulated"]  # somebody is there to evade
     for key, value in expected.items():
         if isinstance(value, float):
             assert row[key] == pytest.approx(value, abs=1e-9, nan_ok=True), key
         else:
             assert row[key] == value, key
+
+
+def test_who_is_told_more_than_an_observation_says_is_no_policy(env: EncounterEnv) -> None:
+    with pytest.raises(ConfigurationError, match="stop_perfect_sight"):
+        ControllerPolicy.named("stop_perfect_sight", env.station)
 
 
 def _wild(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -168,7 +182,7 @@ def test_perfect_sight_is_no_sensor_of_it() -> None:
 
 
 def test_a_policy_before_its_first_action_has_said_nothing(env: EncounterEnv) -> None:
-    assert ControllerPolicy(opponent("none").make(env.station), env.station).tick is None
+    assert ControllerPolicy(env.station.controller(), env.station).tick is None
     env.reset(seed=1)
     with pytest.raises(ConfigurationError, match="no tick yet"):
         env.measures()
