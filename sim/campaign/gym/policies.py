@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.gym.environment import EncounterEnv, Observation, scale
 from qpsafe.sim.campaign.opponents.registry import NOTHING, POINTS, opponent
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.gym.environment import EncounterEnv, Observation
     from qpsafe.sim.campaign.opponents.registry import Controls
     from qpsafe.sim.campaign.station import Station
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]
-Policy = Callable[["Observation"], Array]
+Policy = Callable[[Observation], Array]
 
 
 class ControllerPolicy:
@@ -61,7 +61,7 @@ class ControllerPolicy:
         else:
             d = np.where(d < 0.0, np.nan, np.where(d >= self._station.spots.range_max, np.inf, d))
             self.tick = self._controls.step(q, qd, d)
-        return np.asarray(self.tick.reference.qd / self._station.robot.max_velocity)
+        return np.asarray(self.tick.reference.qd / scale(self._station.robot))
 
 
 def episode(env: EncounterEnv, policy: Policy, seed: int, name: str = "policy") -> dict[str, Any]:
