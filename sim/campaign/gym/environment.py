@@ -30,6 +30,7 @@ except ImportError as error:
     raise MissingExtraError(f"gymnasium is not installed: pip install 'qpsafe[gym]' ({error})") from error
 
 if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
     from qpsafe.sim.campaign.meeting import Meeting
     from qpsafe.sim.campaign.station import Station
     from qpsafe.tick import Tick
@@ -44,13 +45,19 @@ UNUSABLE = -1.0  # in the place of a reading that is no number
 OVERSHOOT = 1.0 + 2.0 * math.exp(-2.0)  # ∫|h| of a servo with a lag, h its impulse response ω (2 - ω t) exp(-ω t)
 MOST = 10.0  # of errors and twists [m, rad, m/s, rad/s]
 DRAWN = (2**24, 2**31)  # seeds of encounters that nobody asked for by number: none of those that campaigns begin with
+LARGEST = 1e6  # what is larger in an action is taken for so much: its velocity is finite, too
 _EXACT = 1.0 + 1e-9
+
+
+def scale(robot: Robot) -> Array:
+    """Joint velocities of the action 1, (n,) [rad/s]: the powers of two that reach the limits, so no bit is lost."""
+    return np.asarray(2.0 ** np.ceil(np.log2(robot.max_velocity)))
 
 
 class EncounterEnv(gymnasium.Env[Observation, Array]):
     """One robot at its work among people who come; encounters are those of a campaign with the same seeds.
 
-    An action is a velocity for every joint as a share of its limit, (n,) in [-1, 1]. Whatever is asked for is brought
+    An action times `scale(robot)` is a velocity for every joint, (n,) in [-1, 1]. Whatever is asked for is brought
     inside position, velocity and acceleration limits, as a controller's commands are; with a number that is not finite
     in it, the whole action counts for nothing and the robot brakes. `info` says both.
 
@@ -93,6 +100,7 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         middle, half = 0.5 * (arm.upper + arm.lower), 0.5 * (arm.upper - arm.lower)
         fastest, six = arm.max_velocity, np.full(6, MOST)
         self.action_space = Box(-1.0, 1.0, (arm.nq,), np.float64)
+        self._scale = scale(arm)
         self.observation_space = Dict({
             "q": Box(middle - most * half, middle + most * half, dtype=np.float64),
             "qd": Box(-most * fastest, most * fastest, dtype=np.float64),
@@ -137,8 +145,9 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         if wish.shape != self._command.shape:
             raise ConfigurationError("EncounterEnv", "action", wish.shape, f"an action of shape {self._command.shape}")
         usable = bool(np.isfinite(wish).all())
-        asked = wish * self.station.robot.max_velocity if usable else np.zeros_like(wish)
-        command, outside = self._limits.box(self._q, self._command).admit(asked)
+        asked = np.clip(wish, -LARGEST, LARGEST) * self._scale if usable else np.zeros_like(wish)
+        box = self._limits.box(self._q, self._command)
+        command, outside = box.admit(asked)
         working = self._advance()
         seen = self._senses.people_seen(self._servo.q)
         said: tuple[Any, ...] = (FOLLOWING if working else SUSPENDED, self._time, OK if usable else BAD_INPUT, seen)

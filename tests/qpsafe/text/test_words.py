@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.text.words import counted, growth
+from qpsafe.text.words import counted, file_word, growth
 
 ROOT = Path(__file__).resolve().parents[3]
 FILES = [file for folder in ("qpsafe", "sim", "tasks") for file in (ROOT / folder).rglob("*.py")]
@@ -48,3 +48,8 @@ def test_no_sentence_puts_a_plural_behind_any_whole_number() -> None:
                 if whole and isinstance(after, ast.Constant) and re.match(PLURAL, str(after.value)):
                     wrong.append(f"{file.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_a_name_as_a_part_of_a_files_makes_no_folder_and_hides_nothing() -> None:
+    found = [file_word(name) for name in ("default", "../x.py:make", "/a/b c.py:f", "ümlaut")]
+    assert found == ["default", "x.py-make", "a-b-c.py-f", "ümlaut"]
