@@ -69,7 +69,7 @@ def load_program(path: str | Path, robot: Robot) -> Program:
 
 @lru_cache(maxsize=8)
 def _program(said: str, path: str | Path, robot: Robot) -> Program:
-    """What a file says, for a robot. Neither it nor a program ever changes: the last ones are not followed once more."""
+    """What a file says, for a robot. Neither it nor a program ever changes: the last ones are not followed again."""
     text = TomlText(said, path, ProgramError)
     return _Builder(text, text.checked(ProgramFile, lambda before, key: key not in _KINDS), robot).program()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import ceil, inf
 from typing import Any, NamedTuple
 
@@ -83,6 +84,20 @@ def path_of(trajectory: Any, dt: float, horizon: float) -> Path:
     """
     if type(trajectory) is FixedPose:
         return Path(code.FIXED, inf, np.zeros(1), _sampled(trajectory, [0.0]), ())
+    if type(trajectory) is Program and all(type(move) in _ENDING for move in trajectory.moves):
+        return _path_of_program(trajectory, dt)
+    return _path_of(trajectory, dt, horizon)
+
+
+@lru_cache(maxsize=8)
+def _path_of_program(program: Program, dt: float) -> Path:
+    """All controllers of a cell follow the same program, which never changes."""
+    path = _path_of(program, dt, inf)
+    path.times.flags.writeable = path.knots.flags.writeable = False
+    return path
+
+
+def _path_of(trajectory: Any, dt: float, horizon: float) -> Path:
     if isinstance(trajectory, Program):
         kind, end = (code.CYCLES if trajectory.cycle else code.RESTS), trajectory.duration
     elif isinstance(trajectory, _ENDING):

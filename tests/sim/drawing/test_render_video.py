@@ -23,6 +23,8 @@ def _opengl() -> None:
     available, why_not = gl_available()
     if not available:
         pytest.skip(why_not)
+
+
 SMALL = (320, 180)
 
 
