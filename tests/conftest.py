@@ -24,12 +24,14 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 #: The longest first: processes that take file after file then end together.
 LONGEST = (
+    "test_real_campaign.py",
+    "test_placement_nodes.py",
+    "test_docs.py",
+    "test_cli.py",
+    "test_campaign_command.py",
     "test_fixed_experiment.py",
     "test_path_experiment.py",
     "test_pick_place.py",
-    "test_docs.py",
-    "test_sick_sensors.py",
-    "test_run_replay.py",
 )
 
 

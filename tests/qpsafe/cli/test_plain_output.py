@@ -47,7 +47,7 @@ def test_help_has_every_word_of_its_source(
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     with pytest.raises(SystemExit):
-        typer.main.get_command(main.app)(args=[*words, "--help"], prog_name="qpsafe")
+        COMMANDS[0][1](args=[*words, "--help"], prog_name="qpsafe")
     shown = capsys.readouterr().out
     assert max(map(len, shown.splitlines())) <= max(width, 50)  # an option's own choices are one word
     shown = " ".join(shown.split()).replace("- ", "-")  # wrapped at hyphens, too

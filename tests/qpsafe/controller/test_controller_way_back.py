@@ -17,6 +17,7 @@ LAWS = {
     "weighted": qpsafe.WeightedLaw,
     "nullspace": qpsafe.NullspaceLaw,
 }
+OTHERS, SLOW = [key for key in LAWS if key != "strict"], pytest.mark.slow
 
 
 def braked_way(speed: float, deceleration: float, dt: float) -> float:
@@ -35,8 +36,9 @@ def near_a_limit(robot: Any, q: np.ndarray, qd: np.ndarray, share: float, dt: fl
     return bool((np.array(ways) > room + 1e-12).any())
 
 
-@pytest.mark.parametrize("key", LAWS)
-@pytest.mark.parametrize("share", [0.2, 0.5])
+@pytest.mark.parametrize(
+    ("key", "share"), [("strict", 0.2), *((k, 0.5) for k in LAWS), *(pytest.param(k, 0.2, marks=SLOW) for k in OTHERS)]
+)
 def test_accelerations_stay_under_their_share_whatever_danger_does(
     run: Any, irb140: Any, key: str, share: float
 ) -> None:

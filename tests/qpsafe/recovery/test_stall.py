@@ -99,7 +99,7 @@ def test_the_way_through_the_joints_ends_at_its_posture_and_then_on_the_path(run
     assert max(np.linalg.norm(e) for e in tick.errors) < 5e-4
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
 def test_goals_out_of_reach_are_named_and_the_robot_stands(run: Any, irb140: Any, seed: int) -> None:
     """Anywhere, from just beyond the reach to 5 m away, in any orientation."""
     rng = np.random.default_rng(seed)
@@ -130,7 +130,7 @@ def test_a_line_out_of_reach_is_named_on_the_way(run: Any, irb140: Any) -> None:
     assert "out of reach" in found[-1][0] or "limit" in found[-1][0]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2))])
 def test_what_is_explained_is_not_said(run: Any, irb140: Any, seed: int) -> None:
     """Moves within reach, danger that comes and goes, a hand that stays: never a word."""
     rng = np.random.default_rng(seed)

@@ -16,6 +16,7 @@ from scipy import stats
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.people import BUNDLED, EncounterModel
+from qpsafe.sim.campaign.people.draws import Draw
 from qpsafe.sim.campaign.people.file import PeopleFile
 from qpsafe.sim.campaign.people.floor_plan import PEDESTAL, FloorPlan, Rectangle
 from qpsafe.sim.campaign.people.tables import Spread, mixed
@@ -31,8 +32,12 @@ TABLES = FloorPlan(
     obstacles=(PEDESTAL, Rectangle(0.3, 0.68, 0.27, 0.59), Rectangle(0.3, 0.68, -0.59, -0.27)),
 )
 DT = 0.004
-DRAWS = [one for seed in range(600) for one in FILE.draws(MODEL.random(seed).tolist())]
-WALKERS = [one for one in DRAWS if one.kind in ("past", "straight", "reach", "turn")]
+
+
+@pytest.fixture(scope="module")
+def draws() -> list[Draw]:
+    """The people of 600 encounters."""
+    return [one for seed in range(600) for one in FILE.draws(MODEL.random(seed).tolist())]
 
 
 def cut(spread: Spread) -> Any:
@@ -48,28 +53,29 @@ def agrees(values: list[float], cdf: Any) -> bool:
     return stats.kstest(values, cdf).pvalue > 0.01
 
 
-def test_walking_speeds_heights_and_azimuths_are_distributed_as_said() -> None:
+def test_walking_speeds_heights_and_azimuths_are_distributed_as_said(draws: list[Draw]) -> None:
+    walkers = [one for one in draws if one.kind in ("past", "straight", "reach", "turn")]
     walk, body, share, women = TABLE.walk, TABLE.body, TABLE.walk.hurry.share, TABLE.body.women.share
     slow, fast, low, tall = (cut(s) for s in (walk.comfortable, walk.hurried, body.height_women, body.height_men))
-    assert agrees([one.speed for one in WALKERS], lambda v: (1.0 - share) * slow.cdf(v) + share * fast.cdf(v))
-    assert agrees([one.height for one in DRAWS], lambda h: women * low.cdf(h) + (1.0 - women) * tall.cdf(h))
-    around = [math.remainder(one.azimuth, 2.0 * math.pi) for one in DRAWS]
+    assert agrees([one.speed for one in walkers], lambda v: (1.0 - share) * slow.cdf(v) + share * fast.cdf(v))
+    assert agrees([one.height for one in draws], lambda h: women * low.cdf(h) + (1.0 - women) * tall.cdf(h))
+    around = [math.remainder(one.azimuth, 2.0 * math.pi) for one in draws]
     assert agrees(around, stats.uniform(-math.pi, 2.0 * math.pi).cdf)
-    reachers = [one.hand_speed for one in DRAWS if one.kind == "reach"]
+    reachers = [one.hand_speed for one in draws if one.kind == "reach"]
     assert agrees(reachers, cut(TABLE.hand.speed).cdf)
     # ... and the test can tell: comfortable speeds alone are others
-    assert not agrees([one.speed for one in WALKERS], slow.cdf)
+    assert not agrees([one.speed for one in walkers], slow.cdf)
 
 
-def test_people_come_from_all_round_as_kinds_and_pairs_are_weighted() -> None:
-    kinds, total = Counter(one.kind for one in DRAWS), sum(TABLE.kinds.weights.values())
-    wanted = [len(DRAWS) * TABLE.kinds.weights[name] / total for name in TABLE.kinds.weights]
+def test_people_come_from_all_round_as_kinds_and_pairs_are_weighted(draws: list[Draw]) -> None:
+    kinds, total = Counter(one.kind for one in draws), sum(TABLE.kinds.weights.values())
+    wanted = [len(draws) * TABLE.kinds.weights[name] / total for name in TABLE.kinds.weights]
     assert stats.chisquare([kinds[name] for name in TABLE.kinds.weights], wanted).pvalue > 0.01
-    pairs = len(DRAWS) - 600
+    pairs = len(draws) - 600
     assert stats.binomtest(pairs, 600, TABLE.encounter.second.share).pvalue > 0.01
-    boards = [one.board for one in DRAWS if one.kind in ("past", "straight", "turn")]
+    boards = [one.board for one in draws if one.kind in ("past", "straight", "turn")]
     assert stats.binomtest(sum(boards), len(boards), TABLE.body.board.share).pvalue > 0.01
-    assert not any(one.board for one in DRAWS if one.kind in ("reach", "stumble"))
+    assert not any(one.board for one in draws if one.kind in ("reach", "stumble"))
 
 
 SPREADS = [

@@ -14,8 +14,17 @@ from qpsafe.sim.drawing.render import Camera, VideoWriter, gl_available
 from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.world.scene import build_scene
 
-AVAILABLE, WHY_NOT = gl_available()
-needs_gl = pytest.mark.skipif(not AVAILABLE, reason=WHY_NOT)
+needs_gl = pytest.mark.usefixtures("_opengl")
+
+
+@pytest.fixture(scope="module")
+def _opengl() -> None:
+    """Asked for here, not on import: the answer takes a Python of its own."""
+    available, why_not = gl_available()
+    if not available:
+        pytest.skip(why_not)
+
+
 SMALL = (320, 180)
 
 
