@@ -73,6 +73,7 @@ def why_not(controller: SafetyController) -> str:
     )
     kind, solver = kind_of(law, len(controller.tasks)), getattr(law, "solver", None)
     reasons = {
+        "the controller is of another making": not _plain(controller),
         "the law has another solver than the own one": kind == OTHER and solver not in (None, "own"),
         "the law is of another making": kind == OTHER,
         "the field is of another making": type(controller.field) is not DangerField,
@@ -92,6 +93,12 @@ def why_not(controller: SafetyController) -> str:
         if not (isinstance(task, PoseTask) and task.plain and type(task).offset is Task.offset):
             return f"the task {label} is not one on the rows of a frame's pose"
     return ""
+
+
+def _plain(controller: SafetyController) -> bool:
+    from qpsafe.controller import SafetyController
+
+    return type(controller) is SafetyController and "step" not in vars(controller)
 
 
 def pack(controller: SafetyController, horizon: float = HORIZON) -> Packed:

@@ -33,13 +33,15 @@ class Touch(NamedTuple):
     """Nearest points of robot and people at one tick.
 
     Attributes:
-        k: The tick.
-        distance: [m].
+        begin: First tick of the contact.
+        k: The tick before it, or that tick itself if it is the first one of all.
+        distance: At k [m].
         on_robot, on_person: (3,) [m].
         body: Of the robot, as in its tree.
         segment: Number of the capsule; from the number of capsules on, that of a board.
     """
 
+    begin: int
     k: int
     distance: float
     on_robot: Array
@@ -61,26 +63,27 @@ def described(run: Recording, station: Station, tracks: PersonTracks, before: To
     robot, k = station.robot, before.k
     state = robot.at(run.q[k])
     away = before.on_person - before.on_robot
-    normal = away / max(float(np.linalg.norm(away)), 1e-12)
+    # towards the person; where they overlap already, the nearest points lie the other way round
+    normal = np.copysign(1.0, before.distance) * away / max(float(np.linalg.norm(away)), 1e-12)
     J = point_jacobian(state, before.body, before.on_robot)
     velocity = J @ run.qd[k]
     towards = float(velocity @ normal)
     closing = towards - float(_velocity(tracks, k, before.segment, before.on_person) @ normal)
-    clamped = _clamped(station, run.q[k], tracks, before, normal)
+    clamped = towards > MOVING and _blocked(station, run.q[k], tracks, before, normal)
     region = part_name(tracks, before.segment)
     mass = effective_mass(robot, run.q[k], J, normal)
-    hit = blow(region, closing, mass, clamped and towards > MOVING)
+    hit = blow(region, closing, mass, clamped)
     speed = float(np.linalg.norm(velocity))
     near = bool(len(seen)) and float(np.linalg.norm(seen - before.on_person, axis=1).min()) <= NEAR
     return {
         "contact": True,
-        "contact_time": (k + 1) * run.dt,
+        "contact_time": before.begin * run.dt,
         "contact_class": classified(speed, towards, clamped),
         "contact_region": region,
         "contact_frame": station.body_name(before.body),
         "moving": speed > MOVING,
         "towards": towards > TOWARDS,
-        "clamped": clamped and speed > MOVING,
+        "clamped": clamped,
         "towards_speed": towards,
         "robot_speed": speed,
         "closing_speed": closing,
@@ -117,11 +120,11 @@ def classified(speed: float, towards: float, clamped: bool) -> str:
     Args:
         speed: Of the point [m/s].
         towards: Its part towards the person [m/s].
-        clamped: Whether the part has nowhere to go.
+        clamped: Whether the part has nowhere to go, and the point moves towards it.
     """
     if not speed > MOVING:
         return "rest"
-    if clamped and towards > MOVING:
+    if clamped:
         return "clamped"
     if towards > TOWARDS:
         return "towards"
@@ -142,7 +145,7 @@ def point_jacobian(state: Any, body: int, point: Array) -> Array:
     return np.asarray(state.robot.tree.supports[body] * linear)
 
 
-def _clamped(station: Station, q: Array, tracks: PersonTracks, before: Touch, normal: Array) -> bool:
+def _blocked(station: Station, q: Array, tracks: PersonTracks, before: Touch, normal: Array) -> bool:
     """Whether scenery, or the robot itself, is right behind the touched part."""
     board = before.segment - len(tracks.radii)
     if board < 0:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.danger.separation import Separation
 from qpsafe.sim.campaign.closest import closest, smallest
 from qpsafe.sim.campaign.contact import TOWARDS, Touch, described
 from qpsafe.sim.campaign.opponents.registry import NOTHING, POINTS, opponent
 from qpsafe.sim.campaign.rows import COLUMNS
+from qpsafe.sim.campaign.sight import first_seen, person_of
 from qpsafe.sim.campaign.work import STANDS, work
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from qpsafe.sim.campaign.meeting import Meeting
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.recording import Recording
-    from qpsafe.sim.campaign.station import Station
 
 Array = NDArray[np.float64]
 
@@ -46,12 +45,12 @@ def measures(plan: Plan, met: Meeting, name: str, run: Recording) -> dict[str, A
         "distance": float(near.distance.min()), "distance_time": run.dt * int(near.distance.argmin()),
     }  # fmt: skip
     row |= work(run, place)._asdict()
-    row |= _sight(run, place, near)
+    row |= _sight(run, met, near)
     touching = np.flatnonzero(near.distance <= 0.0)
     if len(touching):
         k = max(int(touching[0]) - 1, 0)
-        touch = Touch(k, float(near.distance[k]), near.on_robot[k], near.on_person[k], int(near.body[k]),
-                      int(near.segment[k]))  # fmt: skip
+        nearest = near.on_robot[k], near.on_person[k], int(near.body[k]), int(near.segment[k])
+        touch = Touch(int(touching[0]), k, float(near.distance[k]), *nearest)
         row |= described(run, place, tracks, touch, run.points[k])
     pairs = place.distances
     furniture = min(smallest(place, run.q, pairs.furniture), smallest(place, run.q, pairs.floors))
@@ -70,29 +69,34 @@ def _sensor(plan: Plan, name: str) -> str:
     return {POINTS: "perfect", NOTHING: "none"}.get(sight, plan.sensor)
 
 
-def _sight(run: Recording, place: Station, near: Closest) -> dict[str, Any]:
-    """First sight, and the protective separation distance S_p of each tick's approach."""
-    separation = Separation(place.deceleration)
-    needed = separation.distance(near.approach(place.robot, run.q, run.qd))
-    moving = np.abs(run.qd).max(axis=1) > STANDS
-    under = (near.distance < needed) & moving
-    seen = np.array([len(points) > 0 for points in run.points])
-    first = int(seen.argmax()) if seen.any() else len(seen)
-    nearer = near.distance < needed
-    too_near = int(nearer.argmax()) if nearer.any() else len(seen)
-    found: dict[str, Any] = {"under_sp": run.dt * int(under.sum()), "sight_in_time": first <= too_near}
-    if first < len(seen):
-        found |= {"first_sight": run.dt * first, "first_sight_distance": float(near.distance[first])}
+def _sight(run: Recording, met: Meeting, near: Closest) -> dict[str, Any]:
+    """First sight of anybody; whether whoever came below S_p first had been seen by then; time below S_p."""
+    place, tracks = met.station, met.tracks
+    below = near.distance < place.separation.distance(near.approach(place.robot, run.q, run.qd))
+    touched = near.distance <= 0.0
+    before = np.arange(len(touched)) < (int(touched.argmax()) if touched.any() else len(touched))
+    under = below & before & (np.abs(run.qd).max(axis=1) > STANDS)
+    owners = [k for k, person in enumerate(met.story.persons) if person.board is not None]
+    seen = first_seen(run.points, tracks, owners)
+    found: dict[str, Any] = {"under_sp": run.dt * int(under.sum()), "sight_in_time": True}
+    if below.any():
+        k = int(below.argmax())
+        found["sight_in_time"] = seen[person_of(tracks, int(near.segment[k]), owners)] <= k
+    first = min(seen)
+    if first < len(run.q):
+        distance = float(near.distance[first])
+        found |= {"first_sight": run.dt * first}
+        found |= {"first_sight_distance": distance if math.isfinite(distance) else math.nan}
     return found
 
 
 def badness(row: dict[str, Any]) -> float:
-    """Harm in one number, larger is worse, without steps that a search could not climb.
+    """Harm in one number, larger is worse: what a search climbs.
 
-    Without contact it is minus the smallest distance [m]. A contact counts from 0 on: the energy's share of its limit,
-    bounded by 1, and the robot's speed towards the person, bounded by twice what counts as towards.
+    Without contact it is minus the smallest distance [m]. A contact adds, from 0 on, s/(1 + s) of the energy's share s
+    of its limit, and v/(v + 0.1 m/s) of the robot's speed v towards the person.
     """
     if not row["contact"]:
         return -float(row["distance"])
-    speed = min(max(float(row["towards_speed"]), 0.0), 2.0 * TOWARDS) / (2.0 * TOWARDS)
-    return min(float(row["energy_share"]), 1.0) + speed
+    share, speed = float(row["energy_share"]), max(float(row["towards_speed"]), 0.0)
+    return share / (1.0 + share) + speed / (speed + TOWARDS)

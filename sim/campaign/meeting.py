@@ -56,12 +56,13 @@ def meeting(plan: Plan, what: int | Case) -> Meeting:
         what: Number of a trial from 0, whose motion is the plan's, in turn; or a case.
     """
     model = _model(plan.people)
-    if isinstance(what, int):
-        trial, seed, motion = what, plan.seed_of(what), plan.motions[what % len(plan.motions)]
+    if isinstance(what, int | np.integer):
+        trial = int(what)
+        seed, motion = plan.seed_of(trial), plan.motions[trial % len(plan.motions)]
         u = model.random(seed)
     else:
         trial, seed, motion, u = -1, plan.seed, what.motion, np.array(what.u)
-    place = station(plan.robot, motion)
+    place = station(plan.robot, motion, plan.lag, plan.sensor)
     story = model.encounter(u, place.floor_plan)
     assert story.duration is not None
     return Meeting(trial, seed, place, story, story.track(np.arange(0.0, story.duration, DT)))

@@ -12,6 +12,8 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cache
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -25,6 +27,8 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
 from qpsafe.text.toml_text import TomlText
 
+#: Ending of the names of controllers that are told where everybody is.
+PERFECT = "_perfect_sight"
 MOTIONS = ("hold", "line", "pick")
 Sight = Literal["ideal", "sharp", "perfect"]
 SENSORS = get_args(Sight)
@@ -99,6 +103,12 @@ class Plan:
         named = self.to_dict()
         del named["trials"]
         files = [path for path in (self.robot, *self.motions, self.people or "") if path and Path(path).exists()]
+        for name in self.controllers:
+            place = name.removesuffix(PERFECT).rpartition(":")[0]
+            if place:  # a user's own
+                found = None if place.endswith(".py") else find_spec(place)
+                files.append(place if found is None else str(found.origin))
+        named |= {"with": {name: version(name) for name in ("numpy", "numba", "pin", "mujoco")}}
         return named | {"files": {path: _digest(_inside(Path(path))) for path in files}, "code": code_digest()}
 
     def digest(self) -> str:

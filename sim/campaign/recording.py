@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.controller import SafetyController
+from qpsafe.reference import JointReference
 from qpsafe.sim.campaign.opponents.registry import NOTHING, SPOTS
 from qpsafe.sim.campaign.servo import DT, Servo
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK
@@ -69,6 +71,8 @@ def record(
     servo = Servo(station.start, lag)
     run = np.empty((4, ticks, n))
     path_time, status = np.empty(ticks), np.empty(ticks, dtype=np.int64)
+    # a field adds up what it is told, a monitor takes the worst of it
+    told = senses.nearest if isinstance(controls, SafetyController) else senses.everywhere
     phases, points = [], []
     for k in range(ticks):
         q, qd = servo.q, servo.qd
@@ -77,10 +81,12 @@ def record(
         elif entry.sight == SPOTS:
             tick = controls.step(q, qd, senses.distances(q, k))
         else:
-            tick = controls.step(q, qd, points=senses.nearest(q, k))
-        reference = tick.reference
+            tick = controls.step(q, qd, points=told(q, k))
+        reference, number = tick.reference, STATUSES.index(tick.status)
+        if not (np.isfinite(reference.q).all() and np.isfinite(reference.qd).all()):  # nothing moves on such a thing
+            reference, number = JointReference(k, k * DT, q, np.zeros(n)), STATUSES.index(FAULT)
         run[0, k], run[1, k], run[2, k], run[3, k] = q, qd, reference.q, reference.qd
-        path_time[k], status[k] = tick.path_time, STATUSES.index(tick.status)
+        path_time[k], status[k] = tick.path_time, number
         phases.append(tick.phase)
         points.append(tick.points)
         if observer is not None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LOOK = 5.0  # how far a Sharp sensor is moved by what it sees [m]
+NEAR = 0.8  # how far monitors with perfect sight look: nothing limits their speed farther away [m]
 SIGHT = 2.0  # how far perfect sight looks [m]
 UNITS = 0  # seed of the units: the robot has the same sensors in all trials, noise is each trial's own
 
@@ -68,6 +69,10 @@ class Senses:
             return np.empty((0, 3))
         origins, directions = self.spots.rays(self._station.robot.at(q))
         return np.asarray(origins[met] + self._true[met, None] * directions[met])
+
+    def everywhere(self, q: Array, k: int) -> Array:
+        """Where every part of everybody is nearest to each body of the robot at tick k (p, 3) [m], as far as `NEAR`."""
+        return self._bodies.to_each(self._station.robot.at(q), self.tracks.row(k), NEAR).on_other
 
     def nearest(self, q: Array, k: int) -> Array:
         """Where everybody is nearest to each link of the robot at tick k (p, 3) [m], as far as `SIGHT`.

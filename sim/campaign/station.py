@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
+from qpsafe.danger.separation import Separation
 from qpsafe.danger.thresholds import robot_activation
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
+from qpsafe.sim.campaign.servo import OMEGA
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.fixed.stage import robot_stage
@@ -42,6 +44,8 @@ Array = NDArray[np.float64]
 LINE = Path(__file__).with_name("line.toml")
 #: Motions that have a name; any other is the path of a program's file.
 MOTIONS = ("hold", "line", "pick")
+#: How late sensors are: a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s].
+SENSOR_LATE = {"sharp": 0.055}
 
 
 @dataclass(frozen=True)
@@ -51,10 +55,14 @@ class Station:
     Attributes:
         motion: One of `MOTIONS`, or the path of a program.
         robot: The robot, with spots.
+        lag: Of its servos [s].
+        sensor: ``ideal``, ``sharp`` or ``perfect``.
     """
 
     motion: str
     robot: Robot
+    lag: float = 0.0
+    sensor: str = "ideal"
 
     @cached_property
     def cell(self) -> Cell | None:
@@ -182,6 +190,13 @@ class Station:
         self._alone.append(tick.path_time)
 
     @cached_property
+    def separation(self) -> Separation:
+        """Figures of a monitor made for this station: what servo and sensors are late by is in its reaction time."""
+        late = self.lag + 2.0 / OMEGA if self.lag > 0.0 else 0.0
+        reaction = Separation.reaction_time + late + SENSOR_LATE.get(self.sensor, 0.0)
+        return Separation(self.deceleration, reaction_time=reaction)
+
+    @cached_property
     def deceleration(self) -> float:
         """a_s: the smallest deceleration of a stop from the motion, or from 0.5 m/s where there is none [m/s²].
 
@@ -237,19 +252,21 @@ def _stop(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
 
 
 @cache
-def station(robot: str, motion: str) -> Station:
+def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal") -> Station:
     """The station of a robot and a motion, built once a process.
 
     Args:
         robot: A bundled name or a path, as for `load_robot`.
         motion: One of `MOTIONS`, or the path of a program.
+        lag: Of the servos [s].
+        sensor: ``ideal``, ``sharp`` or ``perfect``.
 
     Raises:
         ConfigurationError: The robot has no spots, or cannot do the motion.
     """
     if motion not in MOTIONS and not Path(motion).is_file():
         raise ConfigurationError("campaign", "motions", motion, f"one of {', '.join(MOTIONS)}, or a program's file")
-    found = Station(motion, load_robot(robot))
+    found = Station(motion, load_robot(robot), lag, sensor)
     if found.robot.spots_path is None:
         raise ConfigurationError("campaign", "robot", robot, "a robot with distance sensors (spots.toml)")
     found.start  # noqa: B018  a program that the robot cannot follow is refused now

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -45,12 +46,12 @@ def work(run: Recording, station: Station) -> Work:
     nominal, done = station.nominal(len(run.q)), float(run.path_time[-1])
     standing = (np.abs(run.qd).max(axis=1) < STANDS) & (np.diff(run.path_time, prepend=0.0) == 0.0)
     return Work(
-        progress=done / nominal,
+        progress=done / nominal if nominal > 0.0 else 1.0,
         lost_time=nominal - done,
         stops=_begun(standing) if station.program is not None else 0,
         suspensions=_begun(run.phase == SUSPENDED),
         path_error=_path_error(run, station),
-        reversals=_reversals(run.qd),
+        reversals=_reversals(run.reference_qd),
         limit_excess=_excess(run, station.robot),
         bad_ticks=int((run.status > 1).sum()),
     )
@@ -85,9 +86,13 @@ def _path_error(run: Recording, station: Station) -> float:
 
 def _excess(run: Recording, robot: Robot) -> float:
     """By how much of it a limit of position, velocity or acceleration was passed at most; 0 if none was."""
+    if not (np.isfinite(run.reference_q).all() and np.isfinite(run.reference_qd).all()):
+        return math.inf
+    steps = np.diff(run.reference_q, axis=0) / run.dt
     qdd = np.diff(run.reference_qd, axis=0, prepend=0.0) / run.dt
     over = (
         (np.abs(run.reference_qd) / robot.max_velocity).max() - 1.0,
+        (np.abs(steps) / robot.max_velocity).max() - 1.0 - 1e-9,
         (np.abs(qdd) / robot.max_acceleration).max() - 1.0,
         (robot.lower - run.reference_q).max(),
         (run.reference_q - robot.upper).max(),

@@ -74,6 +74,24 @@ class Bodies:
         """
         return self._measure(state, people, at_most)
 
+    def to_each(self, state: RobotState, people: tuple[Array, ...], at_most: float) -> Near:
+        """Where every capsule of everybody, and every board, is nearest to each body.
+
+        Args:
+            state: The robot.
+            people: A row of `PersonTracks`.
+            at_most: Farther away nothing is looked for [m].
+        """
+        ends, radii, balls, boards, half_sizes = people
+        axes = ends[:, 1] - ends[:, 0]
+        own = np.column_stack((ends.mean(axis=1), 0.5 * np.sqrt((axes * axes).sum(axis=1)) + radii))
+        parts = self._measure(state, (ends, radii, own, boards[:0], half_sizes[:0]), at_most, len(radii))
+        for b in range(len(boards)):
+            none = ends[:0], radii[:0], balls[:0]
+            one = self._measure(state, (*none, boards[b : b + 1], half_sizes[b : b + 1]), at_most)
+            parts = Near(*(np.concatenate(pair) for pair in zip(parts, one, strict=True)))
+        return parts
+
     def to_points(self, state: RobotState, points: Array, at_most: float) -> Near:
         """Every body against every point.
 

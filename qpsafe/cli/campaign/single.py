@@ -157,7 +157,7 @@ def worst(
         print_json(table)
     else:
         _show_cases(found, file, controller, screen)
-    if len(found.unlike) < WANTED:
+    if len(found.new) < WANTED:
         raise typer.Exit(1)
 
 
@@ -167,7 +167,7 @@ def _show_cases(found: Found, file: Path, controller: str, screen: Console) -> N
     sheet = Sheet(
         f"The worst cases of {controller}", ("case", "contact", "part", "distance [mm]", "closing [m/s]"), (1, 2)
     )
-    for number, case in enumerate(found.unlike[:10]):
+    for number, case in enumerate(found.new[:10]):
         row = case.row
         speed = f"{row['closing_speed']:.2f}" if row["contact"] else "-"
         sheet.add_row(str(number), row["contact_class"], row["contact_region"], f"{1e3 * row['distance']:.0f}", speed)

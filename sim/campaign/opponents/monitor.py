@@ -40,7 +40,7 @@ class Monitor:
     """
 
     def __init__(self, station: Station, separation: Separation | None = None) -> None:
-        self.separation = Separation(station.deceleration) if separation is None else separation
+        self.separation = station.separation if separation is None else separation
         self.robot = station.robot
         self._bodies = Bodies(station.world, station.robot)
         self._sensing = station.controller().sensing

@@ -1,13 +1,15 @@
 """The controllers of a campaign by name. A user adds one by `register`: a name, a sentence, a function of the station.
 
 Every name also exists with the ending `_perfect_sight`: the same controller, told the true nearest points of everybody
-instead of what the spots read. Where it still touches somebody, its sensors are not to blame.
+instead of what the spots read: monitors every part of everybody within 0.8 m of a body of the robot, controllers with
+a danger field, which add up what they are told, the nearest point to each link within 2 m.
 """
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -126,10 +128,11 @@ def opponent(name: str) -> Opponent:
         expected = f"one of {', '.join(_known)}, any of them with {PERFECT}, or module:function"
         raise ConfigurationError("campaign", "controllers", name, expected)
     if base != name and found.sight == SPOTS:
-        return found._replace(name=name, sentence=found.sentence + ", told where everybody is", sight=POINTS)
+        return found._replace(name=name, sentence=found.sentence + ", told the true nearest points", sight=POINTS)
     return found
 
 
+@cache
 def _imported(place: str) -> Opponent:
     module, _, function = place.rpartition(":")
     try:

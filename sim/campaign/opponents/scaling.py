@@ -87,7 +87,7 @@ class PathScaling:
             points: Instead (p, 3) [m].
         """
         gaps, clock, separation = self._monitor.gaps(q, qd, distances, points), self._clock, self._monitor.separation
-        allowed = 0.0
+        allowed, fall = 0.0, separation.deceleration * self._dt / self._speed
         if gaps is not None and not len(gaps.distances):
             allowed = 1.0
         elif gaps is not None:
@@ -97,8 +97,8 @@ class PathScaling:
             approach, most = gaps.rows @ full, separation.speed(gaps.distances)
             nearing = approach > _LEAST
             allowed = float(min(1.0, *(most[nearing] / approach[nearing]))) if nearing.any() else 1.0
-        # falls as fast as a stop that S_p reckons with, rises smoothly
-        fall = separation.deceleration * self._dt / self._speed
+            # it falls as fast as the joints can brake along the path
+            fall = self._dt * float((self._robot.max_acceleration / np.maximum(np.abs(full), 1e-9)).min())
         clock.rate = min(max(allowed, clock.rate - fall), clock.rate + self._dt / RAMP)
         tick = self._controller.step(q, qd, points=_NOBODY)
         clock.advance(self._dt, lambda: all(float(np.linalg.norm(e)) <= self._tolerance for e in tick.errors))

@@ -70,11 +70,13 @@ class StopOnly:
             last.seq + 1, last.time + self._dt, last.q + command * self._dt, command, last.active
         )
         self._tick = replace(self._tick, reference=reference, phase=SUSPENDED, events=(), points=self._monitor.seen)
-        at_rest = not command.any()
+        # so do the joints, which may lag behind
+        at_rest = not command.any() and np.abs(qd).max() < STANDS and np.abs(q - reference.q).max() < ARRIVED
         if at_rest and gaps is not None and (gaps.distances >= self._again).all():
             self._controller.reseed()  # back to the path, whose clock stood still
             self._stopping = False
         return self._tick
 
 
+STANDS, ARRIVED = 1e-3, 1e-4  # [rad/s], [rad]
 _NOBODY = np.empty((0, 3))

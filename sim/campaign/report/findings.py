@@ -12,7 +12,7 @@ from qpsafe.text.words import counted
 #: Whom nobody may be worse than.
 NOBODY = "none"
 #: By what.
-WORSE_BY = ("contacts", "moving", "towards", "over_limit")
+WORSE_BY = ("contacts", "towards", "over_limit")
 LEVEL = 0.05
 TOLERANCE = 1e-9  # of a limit, relative to it
 

@@ -116,7 +116,7 @@ SHARES = (
         "towards", "towards", "contacts in which it moved towards the person (> 0.1 m/s)", _column("towards"), True
     ),
     ShareMeasure(
-        "clamped", "clamped", "contacts with the person caught against furniture or floor", _column("clamped")
+        "clamped", "clamped", "contacts of a part with furniture, floor or robot right behind it", _column("clamped")
     ),
     ShareMeasure(
         "over_limit",
@@ -134,7 +134,7 @@ SHARES = (
     ShareMeasure(
         "late_sight",
         "seen late",
-        "trials in which nobody was seen early enough to stop, with contact or without",
+        "trials in which whoever first came nearer than S_p had not been seen by then",
         lambda rows: ~rows["sight_in_time"],
     ),
     ShareMeasure("furniture", "furniture", "the robot touched furniture or the floor", _column("furniture"), True),
@@ -151,19 +151,19 @@ FIGURES = (
         _column("distance"), Statistic(0.1), True,
     ),
     FigureMeasure(
-        "energy_mean", "energy, mean", "J", 1.0, 3, "energy of the contact, 0 without one",
+        "energy_mean", "energy, mean", "J", 1.0, 3, "energy of the first contact, 0 without one",
         _or_zero("energy"), MEAN, True,
     ),
     FigureMeasure(
-        "energy_p95", "energy, 95 %", "J", 1.0, 2, "energy of the contact, 0 without one: 95 % have less",
+        "energy_p95", "energy, 95 %", "J", 1.0, 2, "energy of the first contact, 0 without one: 95 % have less",
         _or_zero("energy"), Statistic(0.95), True,
     ),
     FigureMeasure(
-        "force_p95", "force, 95 %", "N", 1.0, 0, "force of the contact, 0 without one: 95 % have less",
+        "force_p95", "force, 95 %", "N", 1.0, 0, "force of the first contact, 0 without one: 95 % have less",
         _or_zero("force"), Statistic(0.95),
     ),
     FigureMeasure(
-        "closing_p95", "closing, 95 %", "m/s", 1.0, 2, "closing speed at contact, 0 without one: 95 % have less",
+        "closing_p95", "closing, 95 %", "m/s", 1.0, 2, "closing speed at first contact, 0 without one: 95 % have less",
         _or_zero("closing_speed"), Statistic(0.95),
     ),
     FigureMeasure(
@@ -171,11 +171,11 @@ FIGURES = (
         _or_zero("under_sp"), MEAN,
     ),
     FigureMeasure(
-        "progress_mean", "progress", "%", 1e2, 1, "share of a trial's time in which the work went on, mean",
+        "progress_mean", "progress", "%", 1e2, 1, "path time done over path time that is done without people, mean",
         _or_zero("progress"), MEAN,
     ),
     FigureMeasure(
-        "lost_time_mean", "lost time", "s", 1.0, 2, "time of a trial in which the work did not go on, mean",
+        "lost_time_mean", "lost time", "s", 1.0, 2, "path time that is done without people less path time done, mean",
         _or_zero("lost_time"), MEAN, True,
     ),
     FigureMeasure("stops_mean", "stops", "1", 1.0, 2, "stops in a trial, mean", _or_zero("stops"), MEAN),
@@ -188,7 +188,7 @@ FIGURES = (
         _or_zero("path_error"), Statistic(0.95),
     ),
     FigureMeasure(
-        "reversals_mean", "reversals", "1", 1.0, 1, "changes of sign of joints' commanded speeds in a trial, mean",
+        "reversals_mean", "reversals", "1", 1.0, 1, "turns of joints' speeds in a trial, the path's own too, mean",
         _or_zero("reversals"), MEAN,
     ),
 )  # fmt: skip

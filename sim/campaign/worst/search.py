@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 
 NEAR = 0.05  # smallest distance below which a case is kept [m]
 WANTED = 10  # cases that a search should find
-UNLIKE = 0.1  # of the unit cube's edge, in one coordinate at least: cases that differ less are the same one
 RUNS = 4  # starts that a budget lasts for at least
 STEP = 0.15  # first standard deviation of a climb, of the cube's edge
 LEAST = 40  # trials
@@ -36,15 +35,23 @@ class Case(NamedTuple):
     Attributes:
         u: Its point of the unit cube, (d,).
         row: What came of it.
+        climb: Number of the climb that found it; -1 for a random one.
     """
 
     u: tuple[float, ...]
     row: dict[str, Any]
+    climb: int = -1
 
     @property
     def near(self) -> bool:
         """Whether it is kept: contact, or less than `NEAR`."""
         return bool(self.row["contact"] or self.row["distance"] < NEAR)
+
+    @property
+    def kind(self) -> tuple[Any, ...]:
+        """What happens in it: motion, touched part and touching body, what the robot did, and when, to 0.5 s."""
+        words = tuple(self.row.get(key) for key in ("motion", "contact_region", "contact_frame", "contact_class"))
+        return (*words, int(self.row.get("distance_time", 0.0) / 0.5))
 
     @property
     def harm(self) -> float:
@@ -63,7 +70,7 @@ class Found:
         random: Those of the random trials.
         worst: The worst of the search, near or not.
         worst_random: The worst of the random trials.
-        unlike: Of `searched`: cases that differ from each other and from all in `random`.
+        new: Of `searched`: what climbs found and random trials did not, see `_new`.
     """
 
     budget: int
@@ -71,7 +78,7 @@ class Found:
     random: tuple[Case, ...]
     worst: Case
     worst_random: Case
-    unlike: tuple[Case, ...]
+    new: tuple[Case, ...]
 
     @property
     def sentence(self) -> str:
@@ -79,25 +86,26 @@ class Found:
         touched, near = (sum(bool(case.row["contact"]) for case in cases) for cases in (self.searched, self.random))
         text = (
             f"{self.budget:,} searched trials: {len(self.searched):,} nearer than {1e3 * NEAR:.0f} mm, {touched:,} of "
-            f"them contacts; {self.budget:,} random ones: {len(self.random):,} and {near:,}. {len(self.unlike):,} of "
-            "the searched are unlike each other and unlike all random ones."
+            f"them contacts; {self.budget:,} random ones: {len(self.random):,} and {near:,}. Worst harm of the "
+            f"searched {self.worst.harm:.2f}, of the random ones {self.worst_random.harm:.2f}. {len(self.new):,} of "
+            "the searched are new: of a kind that no random trial was, or worse than all of its kind."
         )
-        if len(self.unlike) < WANTED:
+        if len(self.new) < WANTED:
             text += f" The search could not find {WANTED}."
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON; `cases` are those of `unlike`, then the rest of `searched`."""
-        rest = [case for case in self.searched if case not in self.unlike]
+        """For JSON; `cases` are those of `new`, then the rest of `searched`."""
+        rest = [case for case in self.searched if case not in self.new]
         return {
             "budget": self.budget,
             "sentence": self.sentence,
-            "unlike": len(self.unlike),
+            "new": len(self.new),
             "searched": len(self.searched),
             "random": len(self.random),
             "worst": self.worst._asdict(),
             "worst_random": self.worst_random._asdict(),
-            "cases": [case._asdict() for case in (*self.unlike, *rest)],
+            "cases": [case._asdict() for case in (*self.new, *rest)],
         }
 
 
@@ -145,7 +153,7 @@ def search_worst(
         near_random,
         _by_harm(searched)[0],
         _by_harm(beside)[0],
-        tuple(_unlike(near, near_random)),
+        tuple(_new(near, near_random)),
     )
 
 
@@ -162,10 +170,10 @@ def _searched(
     yield from explored
     left = budget - len(explored)
     most = max(left // RUNS, 1)
-    for start in _by_harm(explored):
+    for number, start in enumerate(_by_harm(explored)):
         for case in _climb(play, rng, np.array(start.u), free, min(most, left)):
             left -= 1
-            yield case
+            yield case._replace(climb=number)
         if left <= 0:
             return
 
@@ -211,15 +219,21 @@ def _by_harm(cases: Iterator[Case] | Sequence[Case]) -> tuple[Case, ...]:
     return tuple(sorted(cases, key=lambda case: -case.harm))
 
 
-def _unlike(near: Sequence[Case], others: Sequence[Case]) -> Iterator[Case]:
-    """Cases that differ from the others, and from each other, in one coordinate at least."""
-    if not near:
-        return
-    taken = np.full((len(others) + len(near), len(near[0].u)), np.inf)
-    taken[: len(others)] = [case.u for case in others] or np.zeros((0, len(near[0].u)))
-    count = len(others)
+def _new(near: Sequence[Case], others: Sequence[Case]) -> Iterator[Case]:
+    """What climbs found and random trials did not: the worst case of each kind, if it is worse than all random ones of
+    this kind, or there is none.
+
+    Points of the cube say little of how cases differ: most coordinates have no effect in most encounters.
+
+    Args:
+        near: Cases of the search, the worst first.
+        others: Of the random trials.
+    """
+    known: dict[tuple[Any, ...], float] = {}
+    for case in others:
+        known[case.kind] = max(known.get(case.kind, -np.inf), case.harm)
+    taken = set()
     for case in near:
-        if (np.abs(taken[:count] - case.u).max(axis=1, initial=0.0) >= UNLIKE).all():
-            taken[count] = case.u
-            count += 1
+        if case.climb >= 0 and case.kind not in taken and case.harm > known.get(case.kind, -np.inf):
+            taken.add(case.kind)
             yield case

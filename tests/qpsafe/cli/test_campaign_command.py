@@ -323,7 +323,7 @@ def test_the_worst_cases_are_found_written_and_can_be_played_again(
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found == json.loads((tmp_path / "found" / "worst-stop.json").read_text())
-    assert len(found["cases"]) == found["searched"] >= found["unlike"] >= 10
+    assert len(found["cases"]) == found["searched"] >= found["new"] >= 10
     for number, case in enumerate(found["cases"]):
         plan, controller, again = load_case(tmp_path / "found" / "worst-stop.json", number)
         assert (plan.seed, controller) == (0, "stop")
@@ -332,7 +332,7 @@ def test_the_worst_cases_are_found_written_and_can_be_played_again(
     shown = campaign("worst", "stop", "--trials", "600", "--workers", "1", "--seed", "2", "--out", "found")
     text = " ".join(shown.output.split())
     assert "qpsafe campaign show found/worst-stop.json#0" in text
-    assert "unlike all random ones" in text
+    assert "worse than all of its kind" in text
     little = campaign("worst", "stop", "--trials", "40", "--workers", "1", "--motions", "hold")
     assert little.exit_code == 1
     assert "could not find 10" in " ".join(little.output.split())

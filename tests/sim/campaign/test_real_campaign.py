@@ -66,27 +66,17 @@ def test_the_same_seeds_give_the_same_rows_alone_or_with_others(results: Results
         assert values.tobytes() == together[key][:3].astype(values.dtype).tobytes(), key
 
 
-def test_a_controller_that_moves_towards_people_touches_them_moving() -> None:
-    """Nobody else moves towards people in the same encounters, and it hits them far harder."""
-    found = run_campaign(Plan(trials=8, controllers=("none", ATTACKING, "default"), seed=900, motions=("hold",)))
-    none, attacking, default = (of_controller(found.columns, name) for name in found.plan.controllers)
-    assert attacking["towards"].any()
-    assert not none["towards"].any()
-    assert not default["towards"].any()
-    assert np.nanmax(attacking["energy"]) > 10.0 * np.nanmax((none["energy"], default["energy"]))
-
-
-@pytest.mark.slow
-def test_a_controller_that_moves_towards_people_is_caught() -> None:
-    """By the report: worse than no control at all, with a p-value."""
-    plan = Plan(trials=24, controllers=("none", ATTACKING, "default"), seed=900, motions=("hold",))
+def test_a_controller_that_moves_towards_people_is_caught_by_the_report() -> None:
+    """As worse than no control at all, with a p-value; the default one, in the same encounters, is not."""
+    plan = Plan(trials=40, controllers=("none", ATTACKING, "default"), seed=900, motions=("hold",))
     played = run_campaign(plan)
-    assert any("worse than no control" in text for text in summary(played)["findings"])
-    two = ("none", "default")  # of the same trials
-    kept = np.isin(played.columns["controller"], two)
-    columns = {key: values[kept] for key, values in played.columns.items()}
-    good = dataclasses.replace(played, plan=dataclasses.replace(plan, controllers=two), columns=columns)
-    assert summary(good)["findings"] == []
+    for name, faults in ((ATTACKING, True), ("default", False)):
+        two = ("none", name)
+        kept = np.isin(played.columns["controller"], two)
+        columns = {key: values[kept] for key, values in played.columns.items()}
+        part = dataclasses.replace(played, plan=dataclasses.replace(plan, controllers=two), columns=columns)
+        found = summary(part)["findings"]
+        assert any("worse than no control" in text for text in found) == faults
 
 
 def test_people_may_be_stories_of_the_users(tmp_path: Path) -> None:
