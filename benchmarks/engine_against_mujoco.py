@@ -10,13 +10,14 @@ there. With --dynamics the robot of the reference is moved by torques, and only 
 from __future__ import annotations
 
 import argparse
-import json
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from qpsafe.text.json_text import json_text
 
 EVERY = 5  # ticks between two distances
 
@@ -90,8 +91,8 @@ def main() -> None:
         worst = {key: max(row[key] for row in rows) for key in ("readings", "references", "distances")}
         table = {"trials": len(rows)} | sums | worst
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    given.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(table, indent=1))
+    given.out.write_text(json_text(table) + "\n", encoding="utf-8")
+    print(json_text(table))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.batch import code
 from qpsafe.sensing.detection import BadInput, as_floats, as_points
+from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,9 @@ def _flat(points: Any, n: int) -> tuple[Array, NDArray[np.int64]]:
         there = ~np.isnan(array).all(axis=2)
         return array[there], there.sum(axis=1)
     if not (isinstance(points, list | tuple) and len(points) == n):
-        raise BadInput(f"points are not those of {n} robots: a list of as many arrays, or an array ({n}, p, 3)")
+        raise BadInput(
+            f"points are not those of {counted(n, 'robot')}: a list of as many arrays, or an array ({n}, p, 3)"
+        )
     rows = []
     for given in points:
         try:

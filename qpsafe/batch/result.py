@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.recovery import steps
+from qpsafe.text.words import counted
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 Array = NDArray[np.float64]
@@ -69,7 +70,8 @@ class BatchTick(Names):
     def __repr__(self) -> str:
         count = {name: int((self.status == k).sum()) for k, name in enumerate(self.STATUSES)}
         told = ", ".join(f"{number} {name}" for name, number in count.items() if number)
-        return f"BatchTick({len(self.q)} robots: {told}, largest danger {np.nanmax(self.cdf_n, initial=0.0):.4g})"
+        robots, danger = counted(len(self.q), "robot"), np.nanmax(self.cdf_n, initial=0.0)
+        return f"BatchTick({robots}: {told}, largest danger {danger:.4g})"
 
     @classmethod
     def of(cls, ticks: list[Tick], tasks: tuple[str, ...], rows: int) -> BatchTick:

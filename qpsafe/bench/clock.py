@@ -74,7 +74,7 @@ def time_rows(
     blocks = -(-runs // BLOCK)
     taken = {name: np.empty((blocks, row.calls)) for name, row in rows.items()}
     for row in rows.values():
-        for k in range(-max(warm_up // row.share, 1), 0):
+        for k in range(-max(warm_up // row.share, min(warm_up, 1)), 0):
             row.call(k)
     gc.collect()
     try:

@@ -240,7 +240,7 @@ def of_worst(screen: Console, folder: Path) -> None:
     row = made_up_trials.row(Plan(), 0, "none", 0.0, True)
     case = Case((0.5,), row)
     found = Found(2000, (case,) * 12, (case,), case, case, (case,) * 12)
-    single._show_cases(found, Path("out") / HOSTILE, "none", "--seed 123456", screen)
+    single._show_cases(found, Path("out") / HOSTILE, "none", screen)
 
 
 def of_checks(screen: Console, folder: Path) -> None:
