@@ -80,6 +80,16 @@ def test_wrong_pairs_are_found_and_forgiven_up_to_a_tenth(n: int, seed: int, off
     assert fit.error_95 < 0.01
 
 
+@pytest.mark.parametrize("end", [0, -1])
+@pytest.mark.parametrize("off", [0.5, 1.0, 1.5])
+def test_a_wrong_pair_at_an_end_does_not_bend_the_curve_to_itself(end: int, off: float) -> None:
+    for seed in range(20):
+        curve, d = SharpCurve(0.72, 0.09, 0.02), np.linspace(0.2, 0.8, 10)
+        v = curve.voltage(d) + np.random.default_rng(seed).normal(0.0, 0.002, 10)
+        v[end] += off
+        assert np.flatnonzero(fit_curve("a", d, v).wrong).tolist() == [end % 10]
+
+
 def test_one_wrong_pair_of_14_is_named_and_three_are_too_many(tmp_path: Path) -> None:
     d = np.linspace(0.2, 0.8, 14)
     for wrong, code in (((), 0), ((4,), 0), ((4, 7, 11), 1)):
