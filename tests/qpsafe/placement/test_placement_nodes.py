@@ -24,12 +24,16 @@ ROBOT = qpsafe.load_robot("irb140")
 
 @pytest.fixture(scope="module")
 def nodes() -> Candidates:
-    return candidate_nodes(ROBOT)
+    return candidate_nodes(ROBOT, spacing=0.04)
 
 
-def test_the_irb140_has_as_many_nodes_as_the_source(nodes: Candidates) -> None:
-    assert len(nodes) == 254
-    assert len(set(nodes.nodes.names)) == 254
+@pytest.mark.slow
+def test_the_irb140_has_as_many_nodes_as_the_source() -> None:
+    assert len(candidate_nodes(ROBOT)) == 254
+
+
+def test_nodes_have_names_of_their_own_and_fit_the_robot(nodes: Candidates) -> None:
+    assert len(set(nodes.nodes.names)) == len(nodes) > 150
     nodes.nodes.check(ROBOT)
 
 
@@ -136,7 +140,7 @@ def test_the_constant_matrix_of_7_measures_along_its_z_axis() -> None:
 
 
 def test_a_placement_written_is_what_the_controller_loads(nodes: Candidates, tmp_path: Path) -> None:
-    chosen = [3, 70, 120, 200, 250]
+    chosen = [3, 70, 120, 200, 215]
     path = tmp_path / "spots.toml"
     path.write_text(spots_toml(nodes, chosen, "a test"), encoding="utf-8")
     spots = qpsafe.SpotArray.load(path, ROBOT)
