@@ -11,7 +11,7 @@ import pytest
 
 import qpsafe
 from qpsafe.errors import ConfigurationError, RobotFileError
-from qpsafe.placement.candidates import Candidates, candidate_nodes, node_pose
+from qpsafe.placement.candidates import Candidates, Sensor, _Patch, candidate_nodes, node_pose
 from qpsafe.placement.grid import NEAREST, lattice, thin_out
 from qpsafe.placement.sight import SelfSight
 from qpsafe.placement.sight import _cone as self_sight_cone
@@ -109,6 +109,24 @@ def test_self_sight_is_that_of_every_ray_cast_in_every_pose() -> None:
         expected = ~around.any(axis=0) & (elsewhere.mean(axis=0) <= most)
         assert (sight.clear(region.frame, points, normals, most) == expected).all()
         assert 0 < expected.sum() < len(points)
+
+
+def test_gaps_are_filled_as_if_every_fine_point_had_been_tried() -> None:
+    """And as well at the next spacing, when some of them are known."""
+    region = next(region for region in ROBOT.regions if region.name == "wrist")
+    patch = _Patch(ROBOT, region, Sensor(), SelfSight(ROBOT, 0.16, 0.8, np.deg2rad(6.0)))
+    patch.refine(0.012)
+    usable = patch.usable(*patch.fine)
+    assert 0 < usable.sum() < len(usable)
+    filled = 0
+    for spacing in (0.06, 0.05, 0.06):
+        coarse = patch.usable_lattice(spacing)
+        points, normals = (np.concatenate((a, b[usable])) for a, b in zip(coarse, patch.fine, strict=True))
+        kept = thin_out(points, normals, NEAREST * spacing)
+        filled += (kept >= len(coarse[0])).sum()
+        for found, expected in zip(patch.grid(spacing), (points, normals), strict=True):
+            assert np.array_equal(found, expected[kept])
+    assert filled > 0
 
 
 def test_the_bundled_spots_do_not_see_the_robot_from_close_by() -> None:
