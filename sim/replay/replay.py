@@ -148,7 +148,9 @@ def _difference(k: int, time: float, what: str, run: RunFile, tick: Tick, messag
     a, b = run.arrays[what][k], _answers(tick)[what]
     if isinstance(b, str):
         return Difference(k, time, what, str(a), b, float("nan"))
-    worst = int(np.argmax(np.abs(np.atleast_1d(a) - np.atleast_1d(b))))
+    one, other = (np.atleast_1d(np.asarray(value, dtype=float)) for value in (a, b))
+    gaps = np.where(one.view(np.int64) == other.view(np.int64), -1.0, np.abs(one - other))  # 0 and -0 differ by 0
+    worst = int(np.argmax(gaps))
     recorded, replayed = np.atleast_1d(a)[worst], np.atleast_1d(b)[worst]
     name = f"{what}[{worst}]" if np.ndim(a) else what
     return Difference(k, time, name, repr(float(recorded)), repr(float(replayed)), float(abs(recorded - replayed)))

@@ -1,5 +1,6 @@
 """Programs in TOML: read, followed by the robot, and refused with file, line and key."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -279,3 +280,17 @@ def test_the_program_in_the_docs_is_one(tmp_path: Path) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
     program = load_program(write(tmp_path, page.split("```toml\n")[1].split("```")[0]), robot)
     assert [event.name for event in program.events] == ["grip", "release"]
+
+
+def test_a_file_is_followed_once_a_robot_and_read_anew_when_it_has_changed(tmp_path: Path) -> None:
+    path = tmp_path / "program.toml"
+    path.write_text(GOOD)
+    first = load_program(path, robot)
+    assert load_program(path, robot) is first
+    assert load_program(path, qpsafe.load_robot("irb140")) is not first  # it might be another one
+    path.write_text(GOOD.replace("time = 0.2", "time = 0.7"))
+    assert load_program(path, robot).duration == pytest.approx(first.duration + 0.5)
+    path.write_text(GOOD.replace("cycle = true", "cycle = 3"))
+    for _ in range(2):  # what is wrong is said every time
+        with pytest.raises(ProgramError, match=re.escape(f"{path}:2: cycle")):
+            load_program(path, robot)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import qpsafe
@@ -87,6 +87,7 @@ def test_replay_gives_every_bit_again(run: RunFile) -> None:
 
 
 @given(st.integers(0, TICKS - 1), st.integers(0, 5), st.integers(0, 63), st.sampled_from(["q_ref", "qd_ref"]))
+@example(k=0, joint=1, bit=63, name="qd_ref")  # 0.0 becomes -0.0
 @settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_one_flipped_bit_of_an_answer_is_found_with_its_tick(run: RunFile, k, joint, bit, name) -> None:
     flipped = run.arrays[name].copy()
