@@ -14,7 +14,7 @@ from qpsafe.sim.campaign.report.summary import summary
 from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign
 
-TRIALS = 8
+TRIALS = 6
 CONTROLLERS = ("none", "stop_perfect_sight", "default")
 ATTACKING = f"{Path(__file__)}:attacking"
 
