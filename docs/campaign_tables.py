@@ -1,8 +1,9 @@
-"""Fill the tables of docs/campaign.md and README.md from docs/data/campaign.json: python docs/campaign_tables.py."""
+"""Fill the tables of docs/campaign.md and README.md from docs/data/*.json: python docs/campaign_tables.py."""
 
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,51 @@ PAGES = (DOCS / "campaign.md", DOCS.parent / "README.md")
 DATA = DOCS / "data" / "campaign.json"
 
 
-def committed() -> dict[str, Any] | None:
-    """The campaign's summary that the pages quote; None if there is none yet."""
-    return json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else None
+def committed(name: str = "campaign") -> Any:
+    """What docs/data/NAME.json says; None if there is none yet."""
+    file = DOCS / "data" / f"{name}.json"
+    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
+
+
+def worst() -> str:
+    """What the searches for the worst have found, a line a controller."""
+    head = "| controller | trials | near, searched | near, random | worst harm, searched | worst harm, random | new |"
+    rows = [head, "| --- | --- | --- | --- | --- | --- | --- |"]
+    for name, found in committed("worst").items():
+        rows.append(
+            f"| `{name}` | 2 x {found['budget']} | {found['searched']} | {found['random']} | {found['worst']:.2f} "
+            f"| {found['worst_random']:.2f} | {found['new']} |"
+        )
+    return "\n".join(rows)
+
+
+def engine() -> str:
+    """How near the engine is to MuJoCo, and how fast, in a table."""
+    near, fast = committed("engine"), committed("speed")
+    rows = [
+        ("encounters, ticks compared", f"{near['trials']}, {near['compared']:,}"),
+        ("readings that both have", f"{near['hits']:,}"),
+        ("readings that one has only (grazes)", str(near["grazes"])),
+        ("largest difference of readings [m]", f"{near['readings']:.1e}"),
+        ("of joint references [rad]", f"{near['references']:.1e}"),
+        ("of true distances [m]", f"{near['distances']:.1e}"),
+        ("engine, simulated seconds a second of one core", f"{fast['engine']:.0f}"),
+        ("the same with planning what people do", f"{fast['planned']:.0f}"),
+        ("MuJoCo's rays, distances and dynamics in a loop", f"{fast['mujoco']:.1f}"),
+        ("two processes over one", f"{fast['two_workers']:.2f}"),
+    ]
+    return "\n".join(["| what | measured |", "| --- | --- |", *(f"| {what} | {value} |" for what, value in rows)])
+
+
+def made(text: str) -> str:
+    """A page with all its tables made anew."""
+    text = filled(text, committed())
+    for mark, table in (("worst", worst), ("engine", engine)):
+        pattern = re.compile(rf"<!-- {mark} -->\n.*?<!-- {mark}: end -->", re.DOTALL)
+        text = pattern.sub(lambda _, m=mark, t=table: f"<!-- {m} -->\n\n{t()}\n\n<!-- {m}: end -->", text)
+    return text
 
 
 if __name__ == "__main__":
     for page in PAGES:
-        page.write_text(filled(page.read_text(encoding="utf-8"), committed()), encoding="utf-8")
+        page.write_text(made(page.read_text(encoding="utf-8")), encoding="utf-8")

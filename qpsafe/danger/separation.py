@@ -69,4 +69,4 @@ class Separation:
         b = self.deceleration * self.reaction_time + self.person_speed
         room = np.asarray(distance, dtype=float) - self.standing
         room = np.where(room > 0.0, room, 0.0)  # false for NaN
-        return np.asarray(np.sqrt(b * b + 2.0 * self.deceleration * room) - b)
+        return np.maximum(np.sqrt(b * b + 2.0 * self.deceleration * room) - b, 0.0)  # b² may underflow

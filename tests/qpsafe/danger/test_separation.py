@@ -67,3 +67,8 @@ def test_bad_figures_are_named(key: str, value: object) -> None:
 def test_a_robot_that_cannot_brake_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="deceleration"):
         Separation(0.0)
+
+
+def test_numbers_that_underflow_give_no_speed_below_zero() -> None:
+    assert Separation(0.2, person_speed=1e-301, reaction_time=0.0).speed(-1e-301) >= 0.0
+    assert Separation(0.2, person_speed=5e-324, reaction_time=0.0, person_error=0.0, robot_error=0.0).speed(0.0) == 0.0
