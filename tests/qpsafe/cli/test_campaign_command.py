@@ -310,7 +310,8 @@ def play_case(plan: Plan, case: Encounter, controller: str) -> dict[str, Any]:
     """Contact near a point of the cube, while the robot picks."""
     gap = float(np.linalg.norm(np.array(case.u) - 0.4)) - 0.2 + (case.motion != "pick")
     row = made_up_trials.row(plan, 0, controller, 0.0 if gap < 0.0 else 1.0, False)
-    return row | {"motion": case.motion, "distance": gap, "contact": gap <= 0.0, "search": -gap, "closing_speed": 1.0}
+    told = {"motion": case.motion, "distance": gap, "contact": gap <= 0.0, "search": -gap, "closing_speed": 1.0}
+    return row | told | {"distance_time": 20.0 * case.u[0]}
 
 
 def test_the_worst_cases_are_found_written_and_can_be_played_again(
