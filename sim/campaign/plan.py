@@ -24,6 +24,7 @@ import qpsafe.robots
 import qpsafe.sim
 import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.text.json_text import json_text
 from qpsafe.text.toml_text import TomlText
 
@@ -51,7 +52,7 @@ class Plan:
         motions: Some of `MOTIONS`, or paths of programs (TOML); trials take turns with them.
         controllers: Names of what is compared.
         sensor: One of `SENSORS`, what all controllers see by that do not say otherwise.
-        lag: Delay of the servos, whose joints are of second order then [s]; 0: they follow perfectly.
+        lag: Delay of the servos, in whole ticks, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
         trials: How many.
         seed: Of the first trial; that of trial k is seed + k.
@@ -71,6 +72,8 @@ class Plan:
             raise ConfigurationError("Plan", "sensor", self.sensor, "one of " + ", ".join(SENSORS))
         if not 0.0 <= self.lag <= LONGEST_LAG:
             raise ConfigurationError("Plan", "lag", self.lag, f"0 to {LONGEST_LAG} s")
+        if abs(self.lag - DT * round(self.lag / DT)) > 1e-9:  # a servo would round it
+            raise ConfigurationError("Plan", "lag", self.lag, f"a multiple of the tick, {DT} s")
         for key, least, most in (("trials", 1, MOST_TRIALS), ("seed", 0, 2**53)):
             value = getattr(self, key)
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:

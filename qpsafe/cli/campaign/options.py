@@ -25,7 +25,7 @@ Seed = Annotated[int | None, typer.Option(help="Of the first trial; the others' 
 Robot = Annotated[str | None, typer.Option(help="A bundled robot, or the path of a robot folder, MJCF or URDF file.")]
 Motions = Annotated[str | None, typer.Option(help="hold, line, pick or programs' files, separated by commas.")]
 Sight = Annotated[str | None, typer.Option("--sensor", help="What they see by: ideal, sharp or perfect.")]
-Lag = Annotated[float | None, typer.Option(help="Of the servos [s]; 0: they follow perfectly.")]
+Lag = Annotated[float | None, typer.Option(help="Of the servos, a multiple of 0.004 [s]; 0: they follow perfectly.")]
 People = Annotated[
     Path | None, typer.Option(help="A TOML file with a model of people or a story, or a folder of these.")
 ]

@@ -168,7 +168,7 @@ def test_what_cannot_be_asked_is_named_and_nothing_is_written(arguments: list[st
 def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(tmp_path: Path) -> None:
     campaign(*FEW, "--out", "kept")
     before = {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()}
-    refused = campaign(*FEW, "--out", "kept", "--lag", "0.01")
+    refused = campaign(*FEW, "--out", "kept", "--lag", "0.012")
     assert isinstance(refused.exception, ConfigurationError)
     assert "kept: lag = 0.0: expected 0.01" in str(refused.exception)
     assert "goes on" not in refused.output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,24 @@ def test_a_number_that_is_not_in_the_summary_is_noticed(found: dict[str, Any]) -
     for begin, end in numbers:
         changed = text[:begin] + str(int(text[begin:end]) + 1) + text[end:]
         assert filled(changed, found) != changed
+
+
+def test_what_the_page_says_of_the_tables_is_so() -> None:
+    text = " ".join(PAGE.read_text(encoding="utf-8").split())
+    data = json.loads(TABLES.DATA.read_text(encoding="utf-8"))["controllers"]
+    ours, stop = data["default"], data["stop"]
+    for words, value, low, high in (
+        ("by a fifth", 1.0 - ours["contacts"] / stop["contacts"], 0.17, 0.23),
+        ("twice as often as the stop is", ours["moving"] / stop["moving"], 1.75, 2.25),
+        ("four times what it costs the stop", ours["lost_time_mean"] / stop["lost_time_mean"], 3.5, 4.5),
+        ("left again about three times", ours["suspensions_mean"], 2.5, 3.5),
+        ("Three quarters of the contacts", ours["unseen"] / ours["contacts"], 0.7, 0.8),
+    ):
+        assert words in text
+        assert low <= value <= high, words
+    assert 2 * stop["moving"] < stop["contacts"]
+    assert stop["furniture"] == 0 < ours["furniture"]
+    assert ours["energy_mean"] < stop["energy_mean"]
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,12 @@ import shlex
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.plan import MOTIONS, Plan, PlanFile, code_digest, load_plan, parse_plan
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.text.toml_text import TomlText
 
 
@@ -46,6 +49,7 @@ def test_a_file_says_a_plan_and_its_paths_are_relative_to_it(tmp_path: Path) -> 
         ("seed = true", "seed = True"),
         ("lag = 0.2", "lag = 0.2: expected 0 to 0.1 s"),
         ("lag = nan", "lag = nan"),
+        ("lag = 0.001", "lag = 0.001: expected a multiple of the tick, 0.004 s"),
         ('sensor = "radar"', "sensor = 'radar'"),
         ('motions = ["dance"]', "motions = 'dance'"),
         ('motions = ["none.toml"]', "motions = 'none.toml'"),
@@ -65,6 +69,15 @@ def test_what_is_wrong_in_a_file_is_named_with_its_line(text: str, said: str) ->
     assert str(refused.value).startswith("plan.toml:2: ")
 
 
+@given(st.floats(0.0, 0.1))
+def test_a_lag_is_played_as_it_was_asked_or_refused(lag: float) -> None:
+    ticks = round(lag / DT)
+    assert Plan(lag=ticks * DT).lag == ticks * DT
+    if abs(lag - ticks * DT) > 1e-9:
+        with pytest.raises(ConfigurationError, match="lag"):
+            Plan(lag=lag)
+
+
 def test_a_digest_changes_with_all_that_decides_rows_and_with_nothing_else() -> None:
     plan = Plan()
     others = {
@@ -72,7 +85,7 @@ def test_a_digest_changes_with_all_that_decides_rows_and_with_nothing_else() -> 
         "motions": MOTIONS[:1],
         "controllers": ("stop",),
         "sensor": "sharp",
-        "lag": 0.01,
+        "lag": 0.012,
         "people": __file__,
         "seed": 1,
     }
@@ -91,7 +104,7 @@ def test_the_code_is_part_of_the_digest(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize(
     "plan",
-    [Plan(), Plan(controllers=("stop", "none"), lag=0.012345678901234567, seed=9), Plan(people=__file__, trials=4)],
+    [Plan(), Plan(controllers=("stop", "none"), lag=0.012, seed=9), Plan(people=__file__, trials=4)],
 )
 def test_options_make_the_same_plan_again(plan: Plan) -> None:
     words = shlex.split(plan.options())
