@@ -21,6 +21,7 @@ hqp hqp.own limits robot
 hqp.backends tasks
 hqp.solve danger
 sensing
+geometry
 laws recovery
 pipeline
 tick

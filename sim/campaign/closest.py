@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import add, dot, entry, linked
 from qpsafe.compiled.memory import view
+from qpsafe.geometry import pairs
+from qpsafe.geometry.layout import BALL, BODY, KIND, PLANE
+from qpsafe.geometry.pairs import PAIR, nearest_pair
+from qpsafe.geometry.separation import hull_types
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 from qpsafe.sim.engine import nearest
-from qpsafe.sim.engine.layout import BALL, BODY, KIND, PLANE
-from qpsafe.sim.engine.nearest import PAIR, nearest_pair, robot_to_people
-from qpsafe.sim.engine.separation import hull_types
+from qpsafe.sim.engine.nearest import robot_to_people
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _forward = linked(forward)
-_to_people, _of_pairs = linked(robot_to_people, *nearest.USES), linked(nearest_pair, *nearest.USES)
+_to_people, _of_pairs = linked(robot_to_people, *nearest.USES), linked(nearest_pair, *pairs.USES)
 _ints, _pairs = types.Array(types.int64, 1, "C", readonly=True), types.Array(types.int64, 2, "C", readonly=True)
 _one, _two, _three, _four = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3, 4))
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import entry, linked
 from qpsafe.compiled.memory import view
+from qpsafe.geometry.layout import BODY
+from qpsafe.geometry.pairs import PAIR
+from qpsafe.geometry.separation import hull_types
 from qpsafe.robot.kinematics import Index, cut
 from qpsafe.sim.engine import nearest
-from qpsafe.sim.engine.layout import BODY
-from qpsafe.sim.engine.nearest import PAIR, robot_to_people
-from qpsafe.sim.engine.separation import hull_types
+from qpsafe.sim.engine.nearest import robot_to_people
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

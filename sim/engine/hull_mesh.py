@@ -1,4 +1,4 @@
-"""A mesh in flat arrays: its triangles in a tree of boxes for rays, and its convex hull for distances."""
+"""A mesh in flat arrays: its convex hull for distances, and its triangles in a tree of boxes for rays."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.geometry.hull import Hull
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -15,22 +17,16 @@ LEAF = 2  # triangles in a box of the tree that is not divided further
 
 
 class HullMesh(NamedTuple):
-    """Tables of one mesh, in its own frame.
+    """Tables of one mesh, in its own frame, or of several, one after the other.
 
     Attributes:
-        vertices: Of its convex hull, (v, 3) [m].
-        starts: First neighbour of each vertex, and how many there are in all, (v + 1,).
-        neighbours: Vertices at the other ends of a vertex's edges.
-        planes: Of the hull's faces (n, b), n·x + b <= 0 inside, (p, 4).
+        hull: Of its vertices.
         boxes: Centre and half sizes of boxes around triangles, (m, 6) [m]. A box is followed by those inside it.
         nodes: Of each box where to go on if it is missed; its first triangle and how many it has itself, (m, 3).
         triangles: A corner and the two edges from it, box by box, (t, 9) [m].
     """
 
-    vertices: Array
-    starts: Index
-    neighbours: Index
-    planes: Array
+    hull: Hull
     boxes: Array
     nodes: Index
     triangles: Array
@@ -46,26 +42,10 @@ def hull_mesh(vertices: Array, triangles: Index) -> HullMesh:
     Raises:
         scipy.spatial.QhullError: The vertices do not span a volume.
     """
-    from scipy.spatial import ConvexHull
-
-    hull = ConvexHull(vertices)
-    place = np.full(len(vertices), -1, dtype=np.int64)
-    place[hull.vertices] = np.arange(len(hull.vertices))
-    edges = np.vstack([place[hull.simplices][:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
-    edges = np.unique(np.vstack((edges, edges[:, ::-1])), axis=0)
-    _, first = np.unique(hull.equations.round(7), axis=0, return_index=True)  # triangles of one face have one plane
     pieces = vertices[triangles]
     boxes, nodes, order = _tree(pieces)
     a, b, c = pieces[order].transpose(1, 0, 2)
-    return HullMesh(
-        vertices[hull.vertices],
-        np.searchsorted(edges[:, 0], np.arange(len(hull.vertices) + 1)).astype(np.int64),
-        edges[:, 1],
-        hull.equations[np.sort(first)],
-        boxes,
-        nodes,
-        np.hstack((a, b - a, c - a)),
-    )
+    return HullMesh(Hull.of(vertices), boxes, nodes, np.hstack((a, b - a, c - a)))
 
 
 def _tree(pieces: Array) -> tuple[Array, Index, Index]:
@@ -96,21 +76,14 @@ def _tree(pieces: Array) -> tuple[Array, Index, Index]:
 
 def joined(meshes: Sequence[HullMesh]) -> HullMesh:
     """The tables of several meshes, one after the other."""
-    vertices, edges, boxes, triangles = np.zeros(4, dtype=np.int64)
-    starts, neighbours, nodes = [], [], []
+    boxes = triangles = 0
+    nodes = [np.zeros((0, 3), dtype=np.int64)]
     for mesh in meshes:
-        starts.append(mesh.starts[:-1] + edges)
-        neighbours.append(mesh.neighbours + vertices)
         nodes.append(mesh.nodes + np.array([boxes, triangles, 0]))
-        vertices, edges = vertices + len(mesh.vertices), edges + len(mesh.neighbours)
         boxes, triangles = boxes + len(mesh.boxes), triangles + len(mesh.triangles)
-    empty = np.zeros(0, dtype=np.int64)
     return HullMesh(
-        np.vstack([np.zeros((0, 3)), *(mesh.vertices for mesh in meshes)]),
-        np.append(np.concatenate([empty, *starts]), edges),
-        np.concatenate([empty, *neighbours]),
-        np.vstack([np.zeros((0, 4)), *(mesh.planes for mesh in meshes)]),
+        Hull.joined([mesh.hull for mesh in meshes]),
         np.vstack([np.zeros((0, 6)), *(mesh.boxes for mesh in meshes)]),
-        np.concatenate([empty.reshape(0, 3), *nodes]),
+        np.concatenate(nodes),
         np.vstack([np.zeros((0, 9)), *(mesh.triangles for mesh in meshes)]),
     )

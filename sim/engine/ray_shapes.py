@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import copysign, inf, sqrt
 
 from qpsafe.compiled.compiled import Vector, add, dot, inline
-from qpsafe.sim.engine.layout import CAPSULE, CYLINDER, ELLIPSOID, PLANE, SPHERE
+from qpsafe.geometry.layout import CAPSULE, CYLINDER, ELLIPSOID, PLANE, SPHERE
 
 TINY = 1e-15  # of what is no direction
 

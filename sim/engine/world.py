@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.engine import layout
+from qpsafe.geometry import layout
+from qpsafe.geometry.layout import frozen
 from qpsafe.sim.engine.hull_mesh import HullMesh, hull_mesh, joined
 from qpsafe.sim.world.robot_spec import ROBOT_COLLISION
 from qpsafe.sim.world.surroundings import SCENERY
@@ -135,25 +136,26 @@ class World:
             points = None
             if kind == layout.MESH:
                 meshes.append(_mesh(model, g))
-                points = meshes[-1].vertices
-                sizes = [len(points), len(meshes[-1].planes), len(meshes[-1].boxes)]
+                points = meshes[-1].hull.vertices
+                sizes = [len(points), len(meshes[-1].hull.planes), len(meshes[-1].boxes)]
                 row[layout.VERTEX :] = np.stack((counts, sizes), axis=1).ravel()
                 counts += sizes
-            _measure(numbers, kind, place, model.geom_size[g], points)
-        tables = joined(meshes)
+            layout.describe(numbers, kind, place, model.geom_size[g], points)
+        hulls, *rays = joined(meshes)
+        tables = hulls._asdict() | dict(zip(("boxes", "nodes", "triangles"), rays, strict=True))
         boxes = (index[:, layout.BODY] == 0) & (index[:, layout.KIND] == layout.BOX)
         scenery = model.geom_group[geoms] == SCENERY
         pedestal = np.array([model.geom(g).name.startswith("pedestal") for g in geoms], dtype=bool)
         return cls(
             names=tuple(model.geom(g).name for g in geoms),
-            geoms=_frozen(geoms, np.int64),
-            index=_frozen(index, np.int64),
-            shapes=_frozen(shapes),
-            **{name: _frozen(table, table.dtype) for name, table in tables._asdict().items()},
-            robot=_frozen(np.flatnonzero(~scenery), np.int64),
-            furniture=_frozen(np.flatnonzero(scenery & boxes & ~pedestal), np.int64),
-            floors=_frozen(np.flatnonzero(index[:, layout.KIND] == layout.PLANE), np.int64),
-            movable=_frozen(loose if movable else [], np.int64),
+            geoms=frozen(geoms, np.int64),
+            index=frozen(index, np.int64),
+            shapes=frozen(shapes),
+            **{name: frozen(table, table.dtype) for name, table in tables.items()},
+            robot=frozen(np.flatnonzero(~scenery), np.int64),
+            furniture=frozen(np.flatnonzero(scenery & boxes & ~pedestal), np.int64),
+            floors=frozen(np.flatnonzero(index[:, layout.KIND] == layout.PLANE), np.int64),
+            movable=frozen(loose if movable else [], np.int64),
             bodies=scene.robot.nq + 1 + (len(loose) if movable else 0),
         )
 
@@ -161,9 +163,9 @@ class World:
         """Some of the shapes, or all in another order; tables of meshes stay as they are."""
         rows = np.asarray(chosen, dtype=np.int64)
         kept: dict[str, Any] = {
-            name: _frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES
+            name: frozen(np.flatnonzero(np.isin(rows, getattr(self, name))), np.int64) for name in _CHOICES
         }
-        tables: dict[str, Any] = {name: _frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
+        tables: dict[str, Any] = {name: frozen(getattr(self, name)[rows], getattr(self, name).dtype) for name in _ROWS}
         return replace(self, names=tuple(self.names[i] for i in rows), **tables, **kept)
 
 
@@ -226,33 +228,3 @@ def _hull_mesh(vertices: bytes, triangles: bytes) -> HullMesh:
     """Made once, since every experiment has the same robot; from MuJoCo's float32 and int32."""
     places = np.frombuffer(vertices, dtype=np.float32).reshape(-1, 3).astype(np.float64)
     return hull_mesh(places, np.frombuffer(triangles, dtype=np.int32).reshape(-1, 3).astype(np.int64))
-
-
-def _measure(row: Array, kind: int, place: Array, size: Array, points: Array | None) -> None:
-    """Fill a row of `World.shapes`."""
-    a, b, c = size
-    half = {
-        layout.PLANE: (np.inf, np.inf, 0.0),
-        layout.SPHERE: (a, a, a),
-        layout.CAPSULE: (a, a, a + b),
-        layout.CYLINDER: (a, a, b),
-    }.get(kind, (a, b, c))
-    centre, radius = (
-        np.zeros(3),
-        {layout.CYLINDER: np.hypot(a, b), layout.BOX: np.linalg.norm(size)}.get(kind, max(half)),
-    )
-    if points is not None:
-        low, high = points.min(axis=0), points.max(axis=0)
-        centre, half = 0.5 * (low + high), tuple(0.5 * (high - low))
-        radius = np.sqrt(((points - centre) ** 2).sum(axis=1)).max()
-    row[layout.POSE : layout.SIZE] = place[:3].ravel()
-    row[layout.SIZE : layout.MARGIN] = size
-    row[layout.MARGIN] = a if kind in (layout.SPHERE, layout.CAPSULE) else 0.0
-    row[layout.CASE : layout.BALL] = *centre, *half
-    row[layout.BALL :] = *(place[:3, :3] @ centre + place[:3, 3]), radius
-
-
-def _frozen(values: Any, kind: Any = np.float64) -> NDArray[Any]:
-    array = np.array(values, dtype=kind, order="C")
-    array.flags.writeable = False
-    return array

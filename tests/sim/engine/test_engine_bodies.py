@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import qpsafe
+from qpsafe.geometry.layout import BODY
 from qpsafe.sim.engine.bodies import Bodies
 from qpsafe.sim.engine.distances import Distances
-from qpsafe.sim.engine.layout import BODY
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.world.scene import build_scene
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import qpsafe
-from qpsafe.sim.engine import layout
+from qpsafe.geometry import layout
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.engine.world import World

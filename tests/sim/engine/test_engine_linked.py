@@ -5,9 +5,10 @@ from numba import types
 
 import qpsafe
 from qpsafe.compiled.compiled import entry, linked
+from qpsafe.geometry.pairs import PAIR
 from qpsafe.sim.engine import nearest, spot_rays
 from qpsafe.sim.engine.distances import Distances
-from qpsafe.sim.engine.nearest import PAIR, robot_to_people
+from qpsafe.sim.engine.nearest import robot_to_people
 from qpsafe.sim.engine.spot_rays import SpotReader, read_spots, work_size
 from qpsafe.sim.engine.spot_table import SpotTable
 from qpsafe.sim.engine.tracks import PersonTracks

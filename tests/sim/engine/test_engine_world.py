@@ -8,7 +8,7 @@ import pytest
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.engine import layout
+from qpsafe.geometry import layout
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.world.scene import build_scene
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import copysign, sqrt
 
 from qpsafe.compiled.compiled import Array, Vector, dot, inline, row
+from qpsafe.geometry.layout import BOX, CAPSULE, CYLINDER, ELLIPSOID, KIND, MESH, SIZE, VERTEX, VERTICES
 from qpsafe.robot.kinematics import Index
-from qpsafe.sim.engine.layout import BOX, CAPSULE, CYLINDER, ELLIPSOID, KIND, MESH, SIZE, VERTEX, VERTICES
 
 FEW = 12  # vertices that are looked through one by one
 

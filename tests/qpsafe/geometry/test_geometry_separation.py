@@ -14,7 +14,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import qpsafe
-from qpsafe.sim.engine import layout
+from qpsafe.geometry import layout
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.world.scene import build_scene

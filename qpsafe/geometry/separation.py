@@ -18,12 +18,12 @@ from numba import types
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, row
 from qpsafe.compiled.memory import view
+from qpsafe.geometry import layout, simplex
+from qpsafe.geometry import support as supports
+from qpsafe.geometry.layout import CASE, KIND, MARGIN, MESH, PLANE, PLANES, PLANES_FROM, VERTEX
+from qpsafe.geometry.simplex import nearest_in_simplex
+from qpsafe.geometry.support import support
 from qpsafe.robot.kinematics import Index
-from qpsafe.sim.engine import layout, simplex
-from qpsafe.sim.engine import support as supports
-from qpsafe.sim.engine.layout import CASE, KIND, MARGIN, MESH, PLANE, PLANES, PLANES_FROM, VERTEX
-from qpsafe.sim.engine.simplex import nearest_in_simplex
-from qpsafe.sim.engine.support import support
 
 CLOSE = 1e-12  # difference of upper and lower bound that ends the search, beside 1e-13 of the distance [m]
 STEPS = 128  # enough for round shapes, polytopes need about ten; what is reached then is still an upper bound

@@ -1,0 +1,1 @@
+"""Convex shapes on moving bodies in flat arrays, and their distances, compiled."""
