@@ -39,7 +39,8 @@ class Solids:
         neighbours: Vertices at the other ends of a vertex's edges.
         planes: Of the hulls' faces, (p, 4).
         robot: Which shapes move: the robot's but for its base, and what it carries, (r,).
-        furniture: Pairs of a shape that moves and a known obstacle, apart at the robot's home, (m, 2).
+        furniture: Pairs of a moving shape of the robot's own and a known obstacle, apart at the robot's home, (m, 2).
+            Things carried are in none: they touch furniture where they are picked up and put down.
         own: Pairs of the robot's shapes, its base and what it carries included, on bodies that are neither the same nor
             joined, apart at home, (m, 2).
     """
@@ -97,7 +98,8 @@ class Solids:
         solid = index, shapes, *tables.values()
         of_robot = np.arange(len(own))
         moving = of_robot[index[: len(own), layout.BODY] > 0]
-        pairs = ((i, j) for i in moving.tolist() for j in range(len(own), len(placed)))
+        count = len(body_hulls(robot))  # what is carried touches furniture where it is picked up and put down
+        pairs = ((i, j) for i in moving.tolist() if i < count for j in range(len(own), len(placed)))
         return cls(
             names=tuple(name for _, name, _ in placed),
             index=frozen(index, np.int64),
