@@ -148,7 +148,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(integers, at[33], (3, n)),
         view(integers, at[34], (N, 3)),
         view(integers, at[35], (3,)),
-        view(floats, at[36], (sizes[15] + 2 * sizes[16] * room,)),
+        view(floats, at[36], (sizes[15] + sizes[16] * room,)),
         view(integers, at[37], (sizes[16] * room + 2,)),
     )
 

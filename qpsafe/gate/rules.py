@@ -45,7 +45,7 @@ class VerifiedMotion(Fixed):
                 number = float(value)
             except (TypeError, ValueError):
                 number = math.nan
-            if isinstance(value, bool) or not (0.0 < number if positive else 0.0 <= number) or not number < math.inf:
+            if isinstance(value, bool) or not (number > 0.0 if positive else number >= 0.0) or not number < math.inf:
                 raise ConfigurationError(
                     "VerifiedMotion", key, value, f"a finite number {'> 0' if positive else '>= 0'}"
                 )
