@@ -41,8 +41,8 @@ class Parts:
     """The parts of a `SafetyController`.
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`; what does
-    not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`; what
+    does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
     """
 
     _robot: Robot
