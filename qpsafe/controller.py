@@ -13,6 +13,8 @@ from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.errors import in_words
+from qpsafe.gate.gated import NO_AGES, PASSED
+from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
@@ -69,6 +71,8 @@ class SafetyController(Parts):
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
         barrier: A cap on the danger field, beyond the paper; none by default.
+        gate: Figures of the last step, which lets through what of a command is verified: the default ones for None;
+            "off" sends it as it is. Without limits it is off.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -92,6 +96,7 @@ class SafetyController(Parts):
         carried: Mapping[str, Sequence[Obstacle]] | None = None,
         barrier: DangerBarrier | None = None,
         recovery: RecoveryRules | None = None,
+        gate: VerifiedMotion | str | None = None,
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
         self._dt = checked_dt("SafetyController", dt)
@@ -109,12 +114,13 @@ class SafetyController(Parts):
         if self._spots is not None:
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self._units = UnitWatch(self._spots, self._dt)
-        self.barrier = barrier
+        self.barrier, self.gate = barrier, gate
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
-        self._stages = Stages(robot, self._dt)
+        self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
         self._stages.sense(self._sensing, self._field, self._evasion)
         self._stages.resolve(self._tasks, self._law)
+        _ = self.verifies  # what it measures by is made here
         self.reset()
 
     def reset(self) -> None:
@@ -238,6 +244,10 @@ class SafetyController(Parts):
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
+        gated, gate = PASSED, self.verifies
+        if gate is not None:
+            command, old = command.copy(), NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+            gated = gate(self._q, self._qd, command, seen.points, old)
         messages = (*stall.messages, *messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
@@ -258,6 +268,7 @@ class SafetyController(Parts):
             waits_for=recovery.waits_for,
             joint_names=self._robot.joint_names,
             task_names=self._labels,
+            gate=gated,
             resolved=resolved,
             off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )

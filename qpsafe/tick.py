@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.gate.gated import PASSED, Gated
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.pipeline.resolve import Resolved
@@ -57,6 +58,7 @@ class Tick:
             in front of them.
         joint_names: (n,) names used in reports.
         task_names: Likewise, one a task.
+        gate: What the last step, verified motion, let through of the command, and what was in its way.
         resolved: What tasks, limits and law came to; None if they were not asked.
         off_path: The `errors` where the references of this tick were not the tasks' own trajectories.
     """
@@ -82,6 +84,7 @@ class Tick:
     unseen: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
     task_names: tuple[str, ...] = ()
+    gate: Gated = PASSED
     resolved: Resolved | None = None
     off_path: tuple[NDArray[np.float64], ...] | None = None
 
@@ -129,6 +132,8 @@ class Tick:
             lines.append("  the path waits for: " + ", ".join(self.waits_for))
         if self.binding:
             lines.append("  binding: " + ", ".join(self.binding))
+        if self.gate.cause:
+            lines.append(f"  gate: {self.gate}")
         lines.extend("  note: " + message for message in self.messages)
         qd = np.array2string(self.reference.qd, precision=4, suppress_small=True)
         lines.append(f"  q̇ = {qd} rad/s in {1e6 * self.solve_time:.0f} µs")

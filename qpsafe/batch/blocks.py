@@ -37,6 +37,8 @@ class Shared(NamedTuple):
     endless: Any  # joints that turn without end
     nowhere: Any  # rows and body of the way back through the joints (n + 2,): zeros, then n
     importance: Any  # weights of a weighted law, w_1, ..., w_N, w_E (N + 1,)
+    gate: Any  # its tables, none where it is off
+    gate_whole: Any
 
 
 class Own(NamedTuple):
@@ -72,6 +74,8 @@ class Own(NamedTuple):
     counts: Any  # of the sensors
     age: Any
     far: Any  # looks at readings too large for metres (k,)
+    gate_known: Any  # distances of solids that the gate measured
+    gated: Any  # what it let through, see `gate_kernel` (5,)
 
 
 class Work(NamedTuple):
@@ -113,9 +117,12 @@ class Work(NamedTuple):
     codes: Any
     tasks: Any
     way_marks: Any
+    gate: Any
+    gate_whole: Any
 
 
 #: Those of `Work` that are integers.
-WHOLE_WORK = ("links", "solver_whole", "last", "integers", "way_integers", "codes", "tasks", "way_marks")
+WHOLE_WORK = ("links", "solver_whole", "last", "integers", "way_integers", "codes", "tasks", "way_marks",
+              "gate_whole")  # fmt: skip
 #: How many arrays these are.
 SHARED, OWN, WORK = len(Shared._fields), len(Own._fields), len(Work._fields)

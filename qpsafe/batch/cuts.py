@@ -48,6 +48,8 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(integers, at[21], (n,)),
         view(integers, at[22], (n + 2,)),
         view(floats, at[23], (N + 1,)),
+        view(floats, at[24], (sizes[12],)),
+        view(integers, at[25], (sizes[13],)),
     )
 
 
@@ -92,6 +94,8 @@ def own(floats: Any, integers: Any, at: Any, sizes: Any) -> Own:
         view(integers, at[27], (k, 3)),
         view(integers, at[28], (k,)),
         view(integers, at[29], (k,)),
+        view(floats, at[30], (sizes[14],)),
+        view(floats, at[31], (5,)),
     )
 
 
@@ -144,6 +148,8 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(integers, at[33], (3, n)),
         view(integers, at[34], (N, 3)),
         view(integers, at[35], (3,)),
+        view(floats, at[36], (sizes[15] + 2 * sizes[16] * room,)),
+        view(integers, at[37], (sizes[16] * room + 2,)),
     )
 
 

@@ -122,14 +122,16 @@ def pack(controller: SafetyController, horizon: float = HORIZON) -> Packed:
             paths.append(path_of(trajectory, controller.dt, horizon))
         except Refused as error:
             raise Refused(f"the trajectory {trajectory!r}: {error}") from None
-    floats, whole = _numbers(controller, paths), _whole(controller, paths, trajectories)
+    floats, whole, gate = _numbers(controller, paths), _whole(controller, paths, trajectories), controller.verifies
+    floats["gate"], whole["gate_whole"] = gate.blocks if gate else (np.zeros(0), np.zeros(0, dtype=np.int64))
     counts = [len(task.rows) for task in tasks]  # type: ignore[attr-defined]
     rows = sum(counts)
     spots = 0 if controller.spots is None else len(controller.spots)
     solver = [len(block) for block in workspace(n, max(rows, n) + n, rows + n)]
     sizes = np.array(
         (n, len(tasks), len(paths), spots, rows, len(controller.activation.levels), sum(len(p.times) for p in paths),
-         sum(len(p.events) for p in paths), robot.memory, len(robot.wire_frames), *solver), dtype=np.int64,
+         sum(len(p.events) for p in paths), robot.memory, len(robot.wire_frames), *solver, len(floats["gate"]),
+         len(whole["gate_whole"]), *(gate.sizes if gate else (0, 0, 0))), dtype=np.int64,
     )  # fmt: skip
     at, length, _ = lay_out(cuts.shared, sizes)
     at_own, *own_sizes = lay_out(cuts.own, sizes)
@@ -247,6 +249,7 @@ def reset(packed: Packed, state: State, which: Index) -> None:
     put(state.floats, which, own.held[:, 0], np.inf)
     put(state.floats, which, own.seen[:, (0, 4)], np.nan)
     put(state.floats, which, own.track[:, 0], np.nan)
+    put(state.floats, which, own.gate_known, np.nan)
     put(state.integers, which, own.marks[code.SEQ], -1)
 
 

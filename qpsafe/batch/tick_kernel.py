@@ -31,6 +31,8 @@ from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.compiled.memory import view
 from qpsafe.danger.evasion import filter_by
+from qpsafe.gate import gate_kernel
+from qpsafe.gate.gate_kernel import let_through
 from qpsafe.pipeline.braking import slow_down
 from qpsafe.pipeline.resolve_kernel import given
 from qpsafe.pipeline.sense_kernel import (
@@ -44,9 +46,9 @@ from qpsafe.pipeline.sense_kernel import (
 from qpsafe.recovery.stall import HELD, SAID
 from qpsafe.robot.kinematics import Index, cut, frame_pose
 
-_filter_by, _given = linked(filter_by), inline(given)
+_filter_by, _given, _let_through = linked(filter_by), inline(given), linked(let_through, *gate_kernel.USES)
 #: All the code that goes into the kernel.
-USES = (stages_kernel, *stages_kernel.USES)
+USES = (stages_kernel, gate_kernel, *stages_kernel.USES, *gate_kernel.USES)
 
 
 @inline
@@ -82,6 +84,11 @@ def _plan(
         slowed(p, s, w, i[WIRE_ENDS])
     if s.stall[HELD] == 1:
         slow_down(s.qd, p.limits[3], p.numbers[code.DT], w.command)
+    if p.gate.shape[0] > 0:
+        _let_through(
+            p.gate, p.gate_whole, s.gate_known, w.gate, w.gate_whole, s.q, s.qd, w.command,
+            view(w.points, 0, (s.marks[code.COUNT], 3)), ages, s.gated,
+        )  # fmt: skip
     watch_units(p, s, spots[1], distances, points, how == code.POINTS)
     if how == code.DISTANCES and (s.marks[code.OUT] > 0 or s.marks[code.STOPPED] == 1):
         notes |= code.SENSORS_SICK
@@ -133,6 +140,7 @@ def _brake(p: Any, s: Any, w: Any, f: Array, i: Index) -> None:
     copy(s.qd0, s.evasive)
     slow_down(s.qd, p.limits[3], p.numbers[code.DT], w.command)
     s.result[0], s.result[1], s.result[2] = nan, 0.0, 0.0
+    s.gated[0], s.gated[1] = 1.0, 0.0
     s.marks[code.KEPT_LEVELS], s.marks[code.NOTES], s.marks[code.COUNT], s.marks[code.WAITS] = -1, 0, 0, 0
     for k in range(s.tasks.shape[0]):
         s.activations[k] = 0.0

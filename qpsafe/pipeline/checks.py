@@ -15,6 +15,7 @@ from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
+from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
 from qpsafe.limits import KINDS, Box, JointLimits
@@ -111,6 +112,17 @@ def checked_field(field: Any) -> Any:
     if isinstance(field, type) or not callable(getattr(field, "evaluate", None)):
         raise ConfigurationError("SafetyController", "field", field, "a DangerField")
     return field
+
+
+def checked_gate(gate: VerifiedMotion | str | None) -> VerifiedMotion | None:
+    """Figures of the gate, the default ones for None; None where it is "off"."""
+    if gate is None:
+        return VerifiedMotion()
+    if isinstance(gate, str) and gate == "off":
+        return None
+    if not isinstance(gate, VerifiedMotion):
+        raise ConfigurationError("SafetyController", "gate", gate, 'a VerifiedMotion or "off"')
+    return gate
 
 
 def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:

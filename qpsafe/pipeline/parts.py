@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits, checked_limits
@@ -20,6 +21,7 @@ from qpsafe.pipeline.checks import (
     checked_barrier,
     checked_evasion,
     checked_field,
+    checked_gate,
     checked_law,
 )
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
@@ -29,6 +31,8 @@ from qpsafe.sensing.spots import SpotArray
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
+    from qpsafe.gate.gate import Gate
+    from qpsafe.pipeline.stages import Stages
     from qpsafe.robot.robot import Robot
     from qpsafe.tasks.task import Task
 
@@ -37,7 +41,7 @@ class Parts:
     """The parts of a `SafetyController`.
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`; what does
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`; what does
     not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
     """
 
@@ -55,6 +59,8 @@ class Parts:
     _rules: SensingRules
     _sensing: DistanceSensing | None
     _barrier: DangerBarrier | None
+    _gate: VerifiedMotion | None
+    _stages: Stages
     _recovery_rules: RecoveryRules
     _recovery: Recovery
 
@@ -151,6 +157,22 @@ class Parts:
     @barrier.setter
     def barrier(self, barrier: DangerBarrier | None) -> None:
         self._barrier = checked_barrier(barrier, self._field)
+
+    @property
+    def gate(self) -> VerifiedMotion | Literal["off"]:
+        """Figures of the last step, which verifies the command; it is off without limits too."""
+        return "off" if self._gate is None else self._gate
+
+    @property
+    def verifies(self) -> Gate | None:
+        """What verifies commands now, with its tables; None where that is off."""
+        if self._gate is None or self._limits is None:
+            return None
+        return self._stages.gate(self._gate, self._braking)
+
+    @gate.setter
+    def gate(self, gate: VerifiedMotion | str | None) -> None:
+        self._gate = checked_gate(gate)
 
     @property
     def recovery_rules(self) -> RecoveryRules:

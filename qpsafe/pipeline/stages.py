@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.laws.barrier import DangerBarrier
@@ -11,6 +11,10 @@ from qpsafe.pipeline.resolve import Array, Resolve, Resolved
 from qpsafe.pipeline.sense import Seen, Sense
 
 if TYPE_CHECKING:
+    from qpsafe.gate.gate import Gate
+    from qpsafe.gate.rules import VerifiedMotion
+    from qpsafe.limits import JointLimits
+    from qpsafe.sensing.hulls import Obstacle
     from qpsafe.danger.evasion import Evasion
     from qpsafe.laws.problem import Law
     from qpsafe.robot.robot import Robot
@@ -24,16 +28,24 @@ class Stages:
     Args:
         robot: The robot.
         dt: Tick [s].
+        known: Known obstacles of the surroundings.
+        carried: What tools may carry, by frame.
+        max_age: Older readings do not count [s].
     """
 
-    def __init__(self, robot: Robot, dt: float) -> None:
+    def __init__(
+        self, robot: Robot, dt: float, known: Sequence[Obstacle] = (),
+        carried: Mapping[str, Sequence[Obstacle]] | None = None, max_age: float = 0.0,
+    ) -> None:  # fmt: skip
         self._robot, self._dt = robot, dt
+        self._surroundings = tuple(known), carried, max_age
+        self._gate: Gate | None = None
         self._sense: Sense | None = None
         self._resolve: Resolve | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy makes its own: what is kept here cuts its memory into views, which copying would tear apart."""
-        return Stages, (self._robot, self._dt)
+        return Stages, (self._robot, self._dt, *self._surroundings)
 
     def sense(self, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> Sense:
         """From measurements to q̇0.
@@ -53,6 +65,20 @@ class Stages:
         made = self._resolve
         if made is None or not (made.parts[0] is tasks and made.parts[1] is law):
             made = self._resolve = Resolve(self._robot, tasks, law, self._dt)
+        return made
+
+    def gate(self, rules: VerifiedMotion, limits: JointLimits) -> Gate:
+        """What verifies a command before it is sent.
+
+        Args:
+            rules: Figures.
+            limits: By which the robot brakes.
+        """
+        made = self._gate
+        if made is None or not (made.rules is rules and made.limits is limits):
+            from qpsafe.gate.gate import Gate  # not compiled for who has none
+
+            made = self._gate = Gate(self._robot, rules, limits, *self._surroundings)
         return made
 
     def resolve_under(

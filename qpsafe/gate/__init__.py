@@ -1,0 +1,1 @@
+"""Motion that is verified before it is sent (math section 5)."""

@@ -1,0 +1,96 @@
+"""The gate of one robot: verifies each command before it is sent, and says what it held back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.gate import workspace
+from qpsafe.gate.gate_kernel import CAUSE, PERSON_NEAR, POINT, SHARE, SHORT, TOLD, WHO, let_through
+from qpsafe.gate.gated import PASSED, Gated
+from qpsafe.gate.pack import pack, robot_capsules, surroundings
+from qpsafe.gate.rules import VerifiedMotion
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from qpsafe.limits import JointLimits
+    from qpsafe.robot.robot import Robot
+    from qpsafe.sensing.hulls import Obstacle
+
+Array = NDArray[np.float64]
+
+
+class Gate:
+    """Verifies the commands of one robot.
+
+    Args:
+        robot: The robot.
+        rules: Figures.
+        limits: By which it brakes; those of another making by their numbers.
+        known: Known obstacles of the surroundings.
+        carried: What tools may carry, by frame, as for `SafetyController`.
+        max_age: Older readings do not count [s].
+    """
+
+    def __init__(
+        self, robot: Robot, rules: VerifiedMotion, limits: JointLimits, known: Sequence[Obstacle] = (),
+        carried: Mapping[str, Sequence[Obstacle]] | None = None, max_age: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.robot, self.rules, self.max_age = robot, rules, max_age
+        self.solids, self.groups = surroundings(robot, known, carried)
+        self._fixed = len(self.solids.names) - len(known)  # the first known obstacle
+        self._told = np.zeros(TOLD)
+        self._work: tuple[Array, NDArray[np.int64]] = np.empty(0), np.empty(0, dtype=np.int64)
+        self._room = -1
+        self.set_limits(limits)
+
+    def set_limits(self, limits: JointLimits) -> None:
+        """Brake by other limits from now on."""
+        self.limits = limits
+        self.blocks = pack(self.robot, (self.rules, limits, self.max_age), self.solids, self.groups)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was measured."""
+        self._known = np.full(len(self.groups) * (1 + self.robot.nq), np.nan)
+
+    def __call__(self, q: Array, qd: Array, command: Array, points: Array, ages: Array) -> Gated:
+        """Replace a command (n,) [rad/s] by what of it can be let through.
+
+        Args:
+            q: Commanded position (n,) [rad].
+            qd: Commanded velocity (n,) [rad/s].
+            command: The next one, inside the box of the limits; changed in place.
+            points: Where people were seen (p, 3) [m].
+            ages: How old the readings are, of every spot (k,) [s]; none where they have none.
+        """
+        if len(points) > self._room:
+            self._make_room(len(points))
+        share = let_through(*self.blocks, self._known, *self._work, q, qd, command, points, ages, self._told)
+        return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Floats that it remembers, that it works in without points, and capsules."""
+        return len(self._known), self._lengths(0)[0], len(robot_capsules(self.robot).radii)
+
+    def _lengths(self, points: int) -> tuple[int, int]:
+        pairs, capsules = sum(len(group.pairs) for group in self.groups), len(robot_capsules(self.robot).radii)
+        return workspace.lengths(self.robot.nq, capsules, len(self.solids.index), pairs, points)
+
+    def _make_room(self, points: int) -> None:
+        self._room, (floats, integers) = points, self._lengths(points)
+        self._work = np.zeros(floats), np.zeros(integers, dtype=np.int64)
+
+    def _words(self) -> Gated:
+        told, names = self._told.tolist(), self.solids.names
+        share, who, what = told[SHARE], int(told[WHO]), int(told[POINT])
+        if told[CAUSE] == PERSON_NEAR:
+            return Gated(share, "person", robot_capsules(self.robot).names[who], "", what, told[SHORT])
+        starts = np.cumsum([0, *(len(group.pairs) for group in self.groups)])
+        a, b = self.groups[who].pairs[max(what - int(starts[who]), 0)]
+        cause = "furniture" if b >= self._fixed else "self"
+        return Gated(share, cause, names[a], names[b], -1, told[SHORT])

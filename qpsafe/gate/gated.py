@@ -1,0 +1,45 @@
+"""What the gate did to a command, for the tick."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Gated(NamedTuple):
+    """What the gate did to a command.
+
+    Attributes:
+        share: λ, how much of the way from braking to the command was let through, 0 to 1.
+        cause: ``person``, ``furniture`` or ``self``; empty where all was let through.
+        link: What of the robot came too near: name of a collision geometry.
+        other: What it came too near to: a known obstacle or a geometry of the robot; empty for a person.
+        point: Which seen point, -1 for none.
+        short: Where even braking approaches somebody too fast, by how much in all [m]: somebody was seen where, by
+            the figures, nobody could be. Then braking or the command is sent, whichever comes nearer by less.
+    """
+
+    share: float = 1.0
+    cause: str = ""
+    link: str = ""
+    other: str = ""
+    point: int = -1
+    short: float = 0.0
+
+    @property
+    def verified(self) -> bool:
+        """Whether the robot can stop, or go away, before anybody reaches it."""
+        return self.short == 0.0
+
+    def __str__(self) -> str:
+        if not self.cause:
+            return "all of the command is verified"
+        other = f"point {self.point}" if self.cause == "person" else self.other
+        words = f"{100.0 * self.share:.0f} % of the command let through: {self.link} near {other} ({self.cause})"
+        return words if self.verified else f"{words}; braking comes {1e3 * self.short:.1f} mm too near"
+
+
+PASSED = Gated()
+NO_AGES = np.empty(0)
+"""Where nothing tells how old it is."""

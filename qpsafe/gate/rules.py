@@ -1,0 +1,72 @@
+"""What a verified motion assumes and asks for: all figures in one place."""
+
+from __future__ import annotations
+
+import math
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
+from qpsafe.text.words import call
+
+
+class VerifiedMotion(Fixed):
+    """Figures of the gate, the last step of a tick.
+
+    A person whose nearest point was seen at p can be anywhere in a ball around p, whose radius at time t from now is
+
+        R(t) = person_error + person_speed (t + age + latency + servo_lag).
+
+    Args:
+        person_speed: v_h, the fastest that anybody comes [m/s]. 1.6 for walking people (ISO 13855), 2.0 where hands reach.
+        latency: T_r, from what a sensor sees to the reference that answers it [s]. One tick of sensing, one of the
+            network, and what the controller filters; ours.
+        servo_lag: How far the robot is behind its references [s]; EGM's is 0.010 to 0.020.
+        person_error: ρ, error of a seen point [m]. The Sharp's calibrated one at 0.8 m; ours.
+        approach: v_s, how fast a link may approach somebody whom it could touch [m/s]. Slow enough that a contact
+            stays below every energy limit with an effective mass of 100 kg: ½ 100 · 0.05² = 0.13 J; ours.
+        margin: Distance to furniture, floor and other links that is kept [m]. Between the instants looked at the
+            distance stays above half of it. More than a reference interpolated over a tick leaves it by; ours.
+
+    Raises:
+        ConfigurationError: A number is not finite or negative, or `approach` or `margin` is 0.
+    """
+
+    def __init__(
+        self, person_speed: float = 1.6, *, latency: float = 0.02, servo_lag: float = 0.0, person_error: float = 0.02,
+        approach: float = 0.05, margin: float = 0.004,
+    ) -> None:  # fmt: skip
+        given = {
+            "person_speed": person_speed, "latency": latency, "servo_lag": servo_lag, "person_error": person_error,
+            "approach": approach, "margin": margin,
+        }  # fmt: skip
+        for key, value in given.items():
+            positive = key in ("approach", "margin")
+            try:
+                number = float(value)
+            except (TypeError, ValueError):
+                number = math.nan
+            if isinstance(value, bool) or not (0.0 < number if positive else 0.0 <= number) or not number < math.inf:
+                raise ConfigurationError(
+                    "VerifiedMotion", key, value, f"a finite number {'> 0' if positive else '>= 0'}"
+                )
+            setattr(self, key, number)
+
+    person_speed: float
+    latency: float
+    servo_lag: float
+    person_error: float
+    approach: float
+    margin: float
+
+    def __repr__(self) -> str:
+        rest = {key: getattr(self, key) for key in ("latency", "servo_lag", "person_error", "approach", "margin")}
+        return call(self, self.person_speed, **rest)
+
+    def radius(self, time: float, age: float = 0.0) -> float:
+        """R(t) of the ball that somebody can reach [m].
+
+        Args:
+            time: t, from now [s].
+            age: Of the reading [s].
+        """
+        return self.person_error + self.person_speed * (time + age + self.latency + self.servo_lag)
