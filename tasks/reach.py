@@ -25,7 +25,7 @@ class UnreachableError(QpsafeError, ValueError):
     """The robot cannot take a pose, or cannot take it at this speed; the message says why."""
 
 
-def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int = 200) -> Array:
+def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int = 200, tolerance: float = 1e-9) -> Array:
     """Joint positions (n,) at which `frame` has `pose` (4, 4), by damped Gauss-Newton from a guess, inside the limits.
 
     Args:
@@ -34,6 +34,7 @@ def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int =
         pose: Where it should be (4, 4) [m].
         guess: Where to start (n,) [rad].
         steps: How many are tried.
+        tolerance: What error of position and orientation is none [m, rad].
 
     Raises:
         UnreachableError: None was found from this guess.
@@ -44,7 +45,7 @@ def joints_for(robot: Robot, frame: str, pose: Array, guess: Array, steps: int =
         state = robot.at(q)
         here = state.pose(frame)
         error = np.concatenate((pose[:3, 3] - here[:3, 3], log3(pose[:3, :3] @ here[:3, :3].T)))
-        if np.abs(error).max() <= 1e-9:
+        if np.abs(error).max() <= tolerance:
             return q
         J = state.jacobian(frame)
         damping = 1e-9 + 1e-2 * float(error @ error)  # small near the goal: there it converges quadratically

@@ -27,7 +27,7 @@ pipeline
 tick
 controller
 batch
-plugins placement irc5 irc5.records bench
+plugins placement irc5 irc5.records bench check
 sim.people sim.world sim.engine
 sim.stories sim.recording
 sim.drawing
@@ -42,6 +42,7 @@ sim.campaign
 sim.campaign.report
 sim.irc5
 cli.common cli.sheet cli.outputs
+cli.check
 cli cli.demos
 """
 

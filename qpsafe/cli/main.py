@@ -13,6 +13,7 @@ from qpsafe import __version__
 from qpsafe.cli import (
     bench,
     calibrate,
+    check,
     compare,
     irc5_faults,
     irc5_sim,
@@ -41,6 +42,7 @@ app.add_typer(campaigns, name="campaign")
 app.command("compare")(compare.compare)
 app.add_typer(robots.app, name="robots")
 app.command("bench")(bench.bench)
+app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("story")(story.story)
 app.command("replay")(replay.replay)

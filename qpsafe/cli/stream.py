@@ -8,7 +8,7 @@ from contextlib import ExitStack, redirect_stdout
 from enum import StrEnum
 from io import StringIO
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Annotated, Any, cast
+from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
@@ -49,6 +49,9 @@ def stream(
         Path | None, typer.Option(help="TOML file of what the tool does; by default it keeps the robot's home pose.")
     ] = None,
     cell: Annotated[Path | None, typer.Option(help="TOML file of what stands in the cell by plan.")] = None,
+    unchecked: Annotated[
+        bool, typer.Option("--unchecked", help="Stream a program that `qpsafe check` finds wrong all the same.")
+    ] = False,
     experiment: Annotated[
         Experiment | None, typer.Option(help="Task and cell of an experiment that irc5-sim plays.")
     ] = None,
@@ -113,7 +116,8 @@ def stream(
         from qpsafe.irc5.warm_up import session_limits, warm_up
         from qpsafe.irc5.watchdog import Watchdog
 
-        controller = _controller(robot, program, cell, experiment, make_law(law, projection))
+        checked = _Checked(unchecked, sensors, screen)
+        controller = _controller(robot, program, cell, experiment, make_law(law, projection), checked)
         blind = not sensors or controller.sensing is None
         writer = None if log is None else _writer(log, controller.robot.nq)
         if writer is not None:
@@ -178,9 +182,24 @@ def _writer(path: Path, joints: int) -> ReferenceWriter:
         raise ConfigurationError("qpsafe stream", "--log", str(path), f"a file that can be written ({error})") from None
 
 
+class _Checked(NamedTuple):
+    """How a program is checked: whether what is wrong is only said, whether sensors are in use, where to say it."""
+
+    unchecked: bool = False
+    sensors: bool = True
+    screen: Any = None
+
+
 def _controller(
-    robot: str, program: Path | None, cell: Path | None, experiment: Experiment | None, law: Any
+    robot: str,
+    program: Path | None,
+    cell: Path | None,
+    experiment: Experiment | None,
+    law: Any,
+    checked: _Checked | None = None,
 ) -> SafetyController:
+    from qpsafe.check.check import check_path
+    from qpsafe.cli.check import refuse_or_warn
     from qpsafe.controller import SafetyController
     from qpsafe.robot.loader import load_robot
     from qpsafe.sensing.cell_file import load_cell
@@ -205,6 +224,10 @@ def _controller(
     if program is not None:
         goal = load_program(program, found)
         tool = goal.frame
+    if program is not None or known:
+        checked = checked or _Checked()
+        result = check_path(found, goal, frame=tool, known=known, sensors=checked.sensors)
+        refuse_or_warn("qpsafe stream", program, result, checked.unchecked, checked.screen)
     return SafetyController(found, [PositionTask(tool, goal), OrientationTask(tool, goal)], law, known=known)
 
 

@@ -28,6 +28,9 @@ def path(
         float | None, typer.Option(min=3.0, max=600.0, help="Length of each run [s]; 45, or the story's.")
     ] = None,
     program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
+    unchecked: Annotated[
+        bool, typer.Option("--unchecked", help="Run a program that `qpsafe check` finds wrong all the same.")
+    ] = False,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the bundled.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-path"),
@@ -42,6 +45,8 @@ def path(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.check.check import check_path
+    from qpsafe.cli.check import refuse_or_warn
     from qpsafe.cli.demos.watching import observed
     from qpsafe.laws.hierarchical import HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw
@@ -55,6 +60,7 @@ def path(
     from qpsafe.sim.recording.run_file import StateRecorder, write_run
     from qpsafe.sim.replay.settings import settings_of
     from qpsafe.sim.stories.file import load_story
+    from qpsafe.sim.world.known import known_obstacles
 
     told = None if story is None else load_story(story)
     length = duration or (45.0 if told is None else told.duration)
@@ -81,6 +87,8 @@ def path(
     first = experiments["strict"]
     cycle = first.reference.duration  # a wrong program is refused before anything is written or run
     screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim")
+    check = check_path(robot, first.reference, known=known_obstacles(first.scene))
+    refuse_or_warn("qpsafe demo path", first.program, check, unchecked, screen)
     out.mkdir(parents=True, exist_ok=True)
     runs, found, near = {}, {}, {}
     with progress_bar(screen) as progress:

@@ -39,6 +39,9 @@ def pick_and_place(
     cycles: Annotated[int, typer.Option(min=1, max=100, help="Screws to carry in each run.")] = 10,
     people: Annotated[Path | None, typer.Option(help="TOML file of the people; by default two.")] = None,
     program: Annotated[Path | None, typer.Option(help="TOML file of what the tool does.")] = None,
+    unchecked: Annotated[
+        bool, typer.Option("--unchecked", help="Run a program that `qpsafe check` finds wrong all the same.")
+    ] = False,
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
     ] = 0.0,
@@ -64,6 +67,8 @@ def pick_and_place(
     """
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.check.check import check_path
+    from qpsafe.cli.check import refuse_or_warn
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.pick_place.cell import PROGRAM
     from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
@@ -71,6 +76,7 @@ def pick_and_place(
     from qpsafe.sim.experiments.pick_place.report import figures, promises, to_dict
     from qpsafe.sim.experiments.pick_place.seeds import run_seeds
     from qpsafe.sim.experiments.pick_place.settings import PEOPLE
+    from qpsafe.sim.world.known import known_obstacles
 
     experiment = PickPlaceExperiment(
         load_robot("irb140"),
@@ -86,6 +92,8 @@ def pick_and_place(
     length = experiment.reference.duration / len(experiment.cell.holes)
     names = [person.name for person in experiment.people]
     screen.print(f"a cycle takes {length:.1f} s by the program; {' and '.join(names)} come", style="dim")
+    check = check_path(experiment.robot, experiment.reference, known=known_obstacles(experiment.scene))
+    refuse_or_warn("qpsafe demo pick-and-place", experiment.program, check, unchecked, screen)
     out.mkdir(parents=True, exist_ok=True)
     with progress_bar(screen) as progress:
         run = _first(experiment, out, video, view, screen, progress)

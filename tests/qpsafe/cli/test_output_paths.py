@@ -53,6 +53,7 @@ def test_the_outputs_are_those_of_all_commands() -> None:
         *(("calibrate", name) for name in ("out", "plot")),
         *(
             ("bench", "out"),
+            ("check", "out"),
             ("add", "out"),
             ("story", "plot"),
             ("replay", "video"),

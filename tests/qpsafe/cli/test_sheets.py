@@ -22,6 +22,7 @@ import qpsafe.cli
 from qpsafe.cli import (
     bench,
     calibrate,
+    check,
     common,
     compare,
     irc5_faults,
@@ -79,6 +80,17 @@ def of_calibration(screen: Console, folder: Path) -> None:
     curve, distances = SharpCurve(), np.linspace(0.2, 0.8, 120)
     fits = [Fit(f"{name} {HOSTILE}", curve, distances, curve.voltage(distances + 0.1), 117) for name in "ab"]
     calibrate._show(fits, 0.01, screen)
+
+
+def of_check(screen: Console, folder: Path) -> None:
+    from qpsafe.check.check import check_path
+    from qpsafe.sensing.hulls import Obstacle
+    from qpsafe.tasks.trajectory import FixedPose
+
+    robot = load_robot("irb140")
+    pose = robot.pose("tcp", robot.home)
+    result = check_path(robot, FixedPose(pose), known=[Obstacle.box(f"table {HOSTILE}", [0.3] * 3, pose[:3, 3])])
+    check.show(result, f"{HOSTILE}.toml", screen)
 
 
 def of_compare(screen: Console, folder: Path) -> None:
@@ -252,6 +264,7 @@ TABLES: dict[Callable[..., None], Show] = {
     bench.show: of_bench,
     bench.show_compilation: of_compilation,
     calibrate._show: of_calibration,
+    check.show: of_check,
     campaign.show_table: of_campaign,
     campaign._show_differences: of_campaign,
     single._show_row: of_trial,
