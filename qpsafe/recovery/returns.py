@@ -66,6 +66,11 @@ class RecoveryRules:
             if getattr(self, key) > 1.0:
                 raise ConfigurationError("RecoveryRules", key, getattr(self, key), "a share in (0, 1]")
 
+    @classmethod
+    def paper(cls) -> RecoveryRules:
+        """The way back begins as soon as danger falls below Δ(1-ε), section IV-C, at the pace of the first release."""
+        return cls(speed=0.25, angular_speed=0.8, joint_speed=0.8, calm=1.0, dwell=0.0, held=False)
+
     def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
         """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
         if joints:
