@@ -126,7 +126,7 @@ def _capsule(points: Array) -> tuple[Array, float]:
 
 
 def _circles(points: Array, axes: Array) -> tuple[Array, Array]:
-    """Centres, radii of small cylinders along axes (k, 3) around points: moved towards the farthest (Badoiu, Clarkson)."""
+    """Centres, radii of small cylinders along axes (k, 3) around points, moved towards the farthest (Badoiu)."""
     flat = points - (axes @ points.T)[:, :, None] * axes[:, None]  # (k, v, 3)
     centres = 0.5 * (flat.min(axis=1) + flat.max(axis=1))
     every = np.arange(len(axes))

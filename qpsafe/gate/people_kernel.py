@@ -1,6 +1,6 @@
 """Whether a command, and the braking after it, approaches somebody whom the robot could touch; compiled.
 
-A person seen at p moves no faster than v_h. After a time t on the way, p has moved to any p', |p' - p| <= u = v_h t, and
+A person seen at p moves no faster than v_h. After a time t on the way, p is at any p' with |p' - p| <= u = v_h t, and
 a link whose surface is nearer to p than R(t) could touch somebody: it must not approach any such p' faster than v_s.
 With n from the nearest point of the capsule's axis to p, D its distance, (v, ω) the body's twist and B = v + ω × p the
 body's velocity field at p, the speed of approach to p' is n'ᵀ (v + ω × p'), where n' differs from n by an angle of

@@ -119,7 +119,7 @@ class Parts:
         return self._evasion
 
     @evasion.setter
-    def evasion(self, evasion: Evasion) -> None:
+    def evasion(self, evasion: Evasion | str | None) -> None:
         self._evasion = checked_evasion(evasion, self._robot, self._dt)
 
     @property
