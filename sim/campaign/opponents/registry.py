@@ -78,21 +78,23 @@ def _capped(station: Station) -> SafetyController:
     return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **_PAPER)
 
 
-#: What the paper has: evasion tuned by hand, obstacles that stand still, a return as soon as danger falls.
+#: What the paper has: evasion tuned by hand, obstacles that stand still, a return as soon as danger falls, no gate.
 _PAPER: dict[str, Any] = {
-    "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(),
+    "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(), "gate": "off",
 }  # fmt: skip
 _BUNDLED = (
-    Opponent("none", "follows its path whatever happens", _with(), NOTHING),
+    Opponent("none", "follows its path whatever happens", _with(**_PAPER), NOTHING),
     Opponent("stop", "stops while somebody is nearer than S_p, speed and separation monitoring", StopOnly),
     Opponent("scaling", "slows down along its path so that nobody is approached faster than v_max", PathScaling),
-    Opponent("nullspace", "the paper's law (22) by null-space projections, limits by clipping", _with(NullspaceLaw(), **_PAPER)),
+    Opponent("nullspace", "the paper's law (22) by null-space projections, limits by clipping",
+             _with(NullspaceLaw(), **_PAPER)),
     Opponent("weighted", "one weighted QP, soft priorities", _with(WeightedLaw(), **_PAPER)),
     Opponent("paper", "the paper's law as hierarchical QPs", _with(HierarchicalLaw(projection="paper"), **_PAPER)),
     Opponent("strict", "lexicographic QPs, everything else as in the paper", _with(HierarchicalLaw(), **_PAPER)),
     Opponent("barrier", "strict, with a cap on the danger field", _capped),
     Opponent("velocities", "strict, with approach velocities in the field",
              _with(HierarchicalLaw(), **_PAPER | {"sensing": SensingRules(velocities=True)})),
+    Opponent("unverified", "default without the gate", _with(gate="off")),
     Opponent("default", "SafetyController as it comes", _with()),
 )  # fmt: skip
 _known: dict[str, Opponent] = {entry.name: entry for entry in _BUNDLED}

@@ -79,7 +79,7 @@ def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
     last = controller.step(q, np.zeros(6), points=NOBODY)
     for _ in range(400):
         last = controller.step(last.reference.q, last.reference.qd, points=NOBODY)
-    assert 0.05 - 0.01 < 0.1 - (ROBOT.pose("tcp", last.reference.q)[0, 3] - POSE[0, 3])
+    assert 0.1 - (ROBOT.pose("tcp", last.reference.q)[0, 3] - POSE[0, 3]) > 0.05 - 0.01
     with pytest.raises(ConfigurationError, match=r"gate.*'on'.*VerifiedMotion or \"off\""):
         controller.gate = "on"  # type: ignore[assignment]
     assert controller.gate == controller.gate
