@@ -13,6 +13,7 @@ from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.errors import in_words
+from qpsafe.geometry.clearance import ClearanceLimit
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
@@ -69,6 +70,8 @@ class SafetyController(Parts):
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
         barrier: A cap on the danger field, beyond the paper; none by default.
+        clearance: How near the robot may come to known obstacles, to itself and to what it carries; "off" switches it
+            off, and so does `limits="off"`.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -91,6 +94,7 @@ class SafetyController(Parts):
         known: Sequence[Obstacle] = (),
         carried: Mapping[str, Sequence[Obstacle]] | None = None,
         barrier: DangerBarrier | None = None,
+        clearance: ClearanceLimit | str | None = None,
         recovery: RecoveryRules | None = None,
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
@@ -110,6 +114,8 @@ class SafetyController(Parts):
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self._units = UnitWatch(self._spots, self._dt)
         self.barrier = barrier
+        self._known, self._carried = tuple(known), carried
+        self.clearance = "off" if self._limits is None and clearance is None else clearance
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt)
@@ -139,12 +145,6 @@ class SafetyController(Parts):
         self._recovery.set_tasks(self._tasks, self._activation.suspend_above, restart=False)
         self._active = False
         self._qd = self._qd_before = np.zeros(self._robot.nq)
-
-    def acknowledge(self) -> None:
-        """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
-        if self._sensing is not None:
-            self._sensing.acknowledge()
-        self._units.acknowledge()
 
     def step(
         self,
@@ -226,7 +226,8 @@ class SafetyController(Parts):
         if recovery.phase == RECOVERING and limits is not None:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
-        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits)
+        soft = self._kept_clear(commanded, limits)
+        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)
         else:
@@ -261,11 +262,6 @@ class SafetyController(Parts):
             resolved=resolved,
             off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )
-
-    @property
-    def _acceleration(self) -> NDArray[np.float64]:
-        """That led to the commanded velocity (n,) [rad/s²]."""
-        return (self._qd - self._qd_before) / self._dt
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 #: Joints, tasks, trajectories, spots, rows of all tasks, levels of danger, knots and events of all trajectories,
-#: floats of the robot's kinematics, links of its wire, floats and integers of the solver.
-(JOINTS, TASKS, PATHS, SPOTS, ROWS, LEVELS, KNOTS, EVENTS, MEMORY, LINKS, SOLVER, SOLVER_WHOLE) = range(12)
-HEADS = 12
+#: floats of the robot's kinematics, links of its wire, floats and integers of the solver, of the solids that it keeps
+#: clear of and of the rows that this takes, and how many rows there may be.
+(JOINTS, TASKS, PATHS, SPOTS, ROWS, LEVELS, KNOTS, EVENTS, MEMORY, LINKS, SOLVER, SOLVER_WHOLE, SOLIDS, SOLIDS_WHOLE,
+ CLEARANCE, CLEARANCE_WHOLE, ROOM) = range(17)  # fmt: skip
+HEADS = 17
 
 #: Numbers of the rules and the law.
 (DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,

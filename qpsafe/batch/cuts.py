@@ -48,6 +48,8 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(integers, at[21], (n,)),
         view(integers, at[22], (n + 2,)),
         view(floats, at[23], (N + 1,)),
+        view(floats, at[24], (sizes[12],)),
+        view(integers, at[25], (sizes[13],)),
     )
 
 
@@ -106,7 +108,8 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         room: For how many points.
     """
     n, N, T, R, memory, links = sizes[0], sizes[1], sizes[2], sizes[4], sizes[8], sizes[9]
-    rows = max(R, n) + n
+    soft = sizes[16]
+    rows = max(R, n) + n + soft
     return Work(
         view(floats, at[0], (memory + 12 * links + n + 3 * room,)),
         view(floats, at[1], (room, 3)),
@@ -117,7 +120,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[6], (28 + n,)),
         view(floats, at[7], (sizes[10],)),
         view(floats, at[8], (rows, n)),
-        view(floats, at[9], (rows,)),
+        view(floats, at[9], (2, rows)),
         view(floats, at[10], (R * n + 2 * R + (4 + N) * n,)),
         view(floats, at[11], (n * n + 2 * n + 5 * n,)),
         view(floats, at[12], (N, 4, 4)),
@@ -138,12 +141,16 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[27], (1, 4, 4)),
         view(integers, at[28], (room,)),
         view(integers, at[29], (sizes[11],)),
-        view(integers, at[30], (N + 1,)),
-        view(integers, at[31], (3 * n + (N + 1) * (3 + 2 * n + R),)),
-        view(integers, at[32], (3 * n + 2 * (3 + 3 * n),)),
+        view(integers, at[30], (N + 2,)),
+        view(integers, at[31], (3 * n + (N + 1) * (3 + 2 * n + R + soft),)),
+        view(integers, at[32], (3 * n + 2 * (3 + 3 * n + soft),)),
         view(integers, at[33], (3, n)),
         view(integers, at[34], (N, 3)),
         view(integers, at[35], (3,)),
+        view(floats, at[36], (sizes[14],)),
+        view(floats, at[37], (N + 2,)),
+        view(integers, at[38], (sizes[15],)),
+        view(integers, at[39], (2,)),
     )
 
 
