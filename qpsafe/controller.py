@@ -222,11 +222,10 @@ class SafetyController(Parts):
             tasks, active, law = recovery.way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits = self._limits
-        if recovery.phase == RECOVERING and limits is not None:
+        limits, soft = self._limits, self._kept_clear(commanded)
+        if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
-        soft = self._kept_clear(commanded, limits)
         given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)

@@ -14,7 +14,9 @@ from qpsafe.fixed import Fixed
 from qpsafe.geometry.clearance_kernel import clearance_rows
 from qpsafe.geometry.clearance_level import ClearanceLevel
 from qpsafe.geometry.clearance_work import rows_of, sizes_of
+from qpsafe.geometry.measure import pairs_of
 from qpsafe.geometry.nearness import blocks_of, tables_of
+from qpsafe.geometry.never import never_nearer
 from qpsafe.geometry.solids import Solids
 from qpsafe.text.words import call, counted
 
@@ -74,7 +76,9 @@ class ClearanceLimit(Fixed):
         if not isinstance(solids, Solids):
             raise ConfigurationError("ClearanceLimit", "solids", solids, "Solids.of(robot, ...)")
         self.solids, self.margin = solids, float(margin)
-        pairs = np.vstack((solids.furniture, solids.own))
+        never = never_nearer(solids, robot, self.margin)
+        own = [pair for pair in map(tuple, solids.own.tolist()) if pair not in never]
+        pairs = np.vstack((solids.furniture, pairs_of(own)))
         #: For compiled code, see `nearness.tables_of`.
         self.blocks = blocks_of(solids, robot, pairs, self.margin)
         self._pairs = tables_of(*self.blocks).pairs

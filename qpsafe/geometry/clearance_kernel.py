@@ -43,6 +43,7 @@ from qpsafe.robot.kinematics import Index, cut, place
 TILT = 0.15  # how far the directions lean from the normal in which further points of a pair are looked for [rad]
 AROUND = 8  # how many directions
 CLOSE = 0.05  # a pair that is nearer has rows of further points [m]
+DEEP = 4  # pairs that overlap, whose depth takes long; where there are more, the rest has no rows in this tick
 RETURN_SPEED = 0.05  # of what is nearer than the margin, away from there [m/s]
 _POINT = np.array([SPHERE] + [0] * (INTEGERS - 1), dtype=np.int64)
 _LEAN = np.array([(np.cos(i * np.pi / 4.0), np.sin(i * np.pi / 4.0)) for i in range(AROUND)]) * TILT
@@ -219,6 +220,8 @@ def _pair_rows(t: Any, r: Any, poses: Array, twists: Array, qd: Array, pair: int
     )  # fmt: skip
     if not found[0] < inf:
         return
+    if found[0] < 0.0:
+        r.marks[1] += 1
     d, p, o = found[0], (found[1], found[2], found[3]), (found[4], found[5], found[6])
     along = view(rest, 12 + 6, (3,))
     if abs(d) <= 1e-9:  # the way out, in the first shape's frame
@@ -265,7 +268,7 @@ def clearance_rows(
     n = qd.shape[0]
     r = by_reference(cut_rows(work, whole, n, t.index.shape[0]))
     poses, twists = cut(memory, n, integers[1])[:2]
-    r.marks[0] = 0
+    r.marks[0] = r.marks[1] = 0
     prepare(t, r, poses, twists, qd, limits, dt)
     margin = t.numbers[0]
     for group in range(t.groups.shape[0]):
@@ -295,4 +298,6 @@ def clearance_rows(
             elif passes(t, r, twists, qd, a, shape, c, t.shapes[i, BALL + 3], margin):
                 continue
             _pair_rows(t, r, poses, twists, qd, pair, within, dt)
+            if r.marks[1] == DEEP:
+                return r.marks[0]
     return r.marks[0]

@@ -31,7 +31,7 @@ class Rows(NamedTuple):
         high: (MOST,) their upper bounds [m].
         gaps: (MOST,) distances [m].
         which: (MOST,) pairs they belong to.
-        marks: (1,) how many rows.
+        marks: (2,) how many rows, and how many pairs overlap.
     """
 
     lines: Array
@@ -82,14 +82,14 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
         view(floats, e + MOST * n, (MOST,)),
         view(floats, e + MOST * (n + 1), (MOST,)),
         view(integers, 0, (MOST,)),
-        view(integers, MOST, (1,)),
+        view(integers, MOST, (2,)),
     )
 
 
 def sizes_of(n: int, g: int) -> tuple[int, int]:
     """How many floats and integers these are, for n joints and g shapes."""
     floats = 7 * n + (n + 1) * n + 3 * (n + 1) + 3 * g + 2 * (43 + WORK) + FLOATS + n + 3 + MOST * (n + 3)
-    return floats, MOST + 1
+    return floats, MOST + 2
 
 
 cut_rows = inline(rows_of)

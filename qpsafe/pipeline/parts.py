@@ -235,14 +235,9 @@ class Parts:
         """That led to the commanded velocity (n,) [rad/s²]."""
         return (self._qd - self._qd_before) / self._dt
 
-    def _kept_clear(self, commanded: RobotState, limits: JointLimits | None) -> tuple[Level, ...]:
-        """Rows that keep the robot clear of furniture and itself; none where nothing can come too near.
-
-        Args:
-            commanded: Commanded configuration.
-            limits: Of this tick.
-        """
-        if self._clearance is None or limits is None:
+    def _kept_clear(self, commanded: RobotState) -> tuple[Level, ...]:
+        """Rows that keep the robot clear of furniture and itself; none where nothing can come too near."""
+        if self._clearance is None or self._limits is None:
             return ()
-        rows = self._clearance.level(commanded, self._qd, limits)
+        rows = self._clearance.level(commanded, self._qd, self._limits)
         return () if rows is None else (rows,)
