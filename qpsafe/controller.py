@@ -15,6 +15,7 @@ from qpsafe.danger.field import DangerField
 from qpsafe.errors import in_words
 from qpsafe.gate.gated import NO_AGES, PASSED
 from qpsafe.gate.rules import VerifiedMotion
+from qpsafe.geometry.clearance import ClearanceLimit
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import Law
@@ -73,6 +74,8 @@ class SafetyController(Parts):
         barrier: A cap on the danger field, beyond the paper; none by default.
         gate: Figures of the last step, which lets through what of a command is verified: the default ones for None;
             "off" sends it as it is. Without limits it is off.
+        clearance: How near the robot may come to known obstacles, to itself and to what it carries; "off" switches it
+            off, and so does `limits="off"`.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -95,6 +98,7 @@ class SafetyController(Parts):
         known: Sequence[Obstacle] = (),
         carried: Mapping[str, Sequence[Obstacle]] | None = None,
         barrier: DangerBarrier | None = None,
+        clearance: ClearanceLimit | str | None = None,
         recovery: RecoveryRules | None = None,
         gate: VerifiedMotion | str | None = None,
     ) -> None:
@@ -115,6 +119,8 @@ class SafetyController(Parts):
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self._units = UnitWatch(self._spots, self._dt)
         self.barrier, self.gate = barrier, gate
+        self._known, self._carried = tuple(known), carried
+        self.clearance = "off" if self._limits is None and clearance is None else clearance
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
@@ -145,12 +151,6 @@ class SafetyController(Parts):
         self._recovery.set_tasks(self._tasks, self._activation.suspend_above, restart=False)
         self._active = False
         self._qd = self._qd_before = np.zeros(self._robot.nq)
-
-    def acknowledge(self) -> None:
-        """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
-        if self._sensing is not None:
-            self._sensing.acknowledge()
-        self._units.acknowledge()
 
     def step(
         self,
@@ -228,11 +228,11 @@ class SafetyController(Parts):
             tasks, active, law = recovery.way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits = self._limits
-        if recovery.phase == RECOVERING and limits is not None:
+        limits, soft = self._limits, self._kept_clear(commanded)
+        if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
-        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits)
+        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)
         else:
@@ -272,11 +272,6 @@ class SafetyController(Parts):
             resolved=resolved,
             off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
         )
-
-    @property
-    def _acceleration(self) -> NDArray[np.float64]:
-        """That led to the commanded velocity (n,) [rad/s²]."""
-        return (self._qd - self._qd_before) / self._dt
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.gate.gated import PASSED, Gated
+from qpsafe.geometry.clearance_level import ClearanceLevel
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.pipeline.resolve import Resolved
@@ -111,6 +112,12 @@ class Tick:
         return () if self.box is None else self.box.binding(self.reference.qd, self.joint_names)
 
     @property
+    def clearance(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of shapes that the command is kept from coming nearer by: their names and distance [m]."""
+        levels = () if self.resolved is None else self.resolved.soft
+        return tuple(x for rows in levels if isinstance(rows, ClearanceLevel) for x in rows.binding(self.reference.qd))
+
+    @property
     def residuals(self) -> tuple[tuple[float, tuple[float, ...]], ...]:
         """Per regime solved: (weight, residual norm per level, the evasive level last)."""
         return () if self.law is None else tuple((w, solution.residuals) for w, solution in self.law.regimes)
@@ -134,6 +141,8 @@ class Tick:
             lines.append("  binding: " + ", ".join(self.binding))
         if self.gate.cause:
             lines.append(f"  gate: {self.gate}")
+        for one, other, gap in self.clearance:
+            lines.append(f"  kept clear: {one} and {other}, {1e3 * gap:.1f} mm apart")
         lines.extend("  note: " + message for message in self.messages)
         qd = np.array2string(self.reference.qd, precision=4, suppress_small=True)
         lines.append(f"  q̇ = {qd} rad/s in {1e6 * self.solve_time:.0f} µs")

@@ -37,6 +37,8 @@ class Shared(NamedTuple):
     endless: Any  # joints that turn without end
     nowhere: Any  # rows and body of the way back through the joints (n + 2,): zeros, then n
     importance: Any  # weights of a weighted law, w_1, ..., w_N, w_E (N + 1,)
+    solids: Any  # what the robot keeps clear of, see `ClearanceLimit.blocks`; empty for nothing
+    solids_whole: Any
     gate: Any  # its tables, none where it is off
     gate_whole: Any
 
@@ -117,12 +119,18 @@ class Work(NamedTuple):
     codes: Any
     tasks: Any
     way_marks: Any
+    clearance: Any  # see `qpsafe.geometry.clearance_kernel.Rows`
+    near: Any
+    clearance_whole: Any
+    soft: Any
     gate: Any
     gate_whole: Any
 
 
 #: Those of `Work` that are integers.
-WHOLE_WORK = ("links", "solver_whole", "last", "integers", "way_integers", "codes", "tasks", "way_marks",
-              "gate_whole")  # fmt: skip
+WHOLE_WORK = (
+    "links", "solver_whole", "last", "integers", "way_integers", "codes", "tasks", "way_marks", "clearance_whole",
+    "soft", "gate_whole",
+)  # fmt: skip
 #: How many arrays these are.
 SHARED, OWN, WORK = len(Shared._fields), len(Own._fields), len(Work._fields)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 #: Joints, tasks, trajectories, spots, rows of all tasks, levels of danger, knots and events of all trajectories,
-#: floats of the robot's kinematics, links of its wire, floats and integers of the solver; of the gate floats, integers,
-#: what it remembers, what it works in without points, capsules.
-(JOINTS, TASKS, PATHS, SPOTS, ROWS, LEVELS, KNOTS, EVENTS, MEMORY, LINKS, SOLVER, SOLVER_WHOLE, GATE, GATE_WHOLE,
- GATE_KNOWN, GATE_WORK, CAPSULES) = range(17)  # fmt: skip
-HEADS = 17
+#: floats of the robot's kinematics, links of its wire, floats and integers of the solver, of the solids that it keeps
+#: clear of and of the rows that this takes, and how many rows there may be; of the gate its
+#: floats, integers, what it remembers, what it works in without points, capsules.
+(JOINTS, TASKS, PATHS, SPOTS, ROWS, LEVELS, KNOTS, EVENTS, MEMORY, LINKS, SOLVER, SOLVER_WHOLE, SOLIDS, SOLIDS_WHOLE,
+ CLEARANCE, CLEARANCE_WHOLE, ROOM, GATE, GATE_WHOLE, GATE_KNOWN, GATE_WORK, CAPSULES) = range(22)  # fmt: skip
+HEADS = 22
 
 #: Numbers of the rules and the law.
 (DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,

@@ -50,6 +50,8 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(floats, at[23], (N + 1,)),
         view(floats, at[24], (sizes[12],)),
         view(integers, at[25], (sizes[13],)),
+        view(floats, at[26], (sizes[17],)),
+        view(integers, at[27], (sizes[18],)),
     )
 
 
@@ -94,7 +96,7 @@ def own(floats: Any, integers: Any, at: Any, sizes: Any) -> Own:
         view(integers, at[27], (k, 3)),
         view(integers, at[28], (k,)),
         view(integers, at[29], (k,)),
-        view(floats, at[30], (sizes[14],)),
+        view(floats, at[30], (sizes[19],)),
         view(floats, at[31], (5,)),
     )
 
@@ -110,7 +112,8 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         room: For how many points.
     """
     n, N, T, R, memory, links = sizes[0], sizes[1], sizes[2], sizes[4], sizes[8], sizes[9]
-    rows = max(R, n) + n
+    soft = sizes[16]
+    rows = max(R, n) + n + soft
     return Work(
         view(floats, at[0], (memory + 12 * links + n + 3 * room,)),
         view(floats, at[1], (room, 3)),
@@ -121,7 +124,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[6], (28 + n,)),
         view(floats, at[7], (sizes[10],)),
         view(floats, at[8], (rows, n)),
-        view(floats, at[9], (rows,)),
+        view(floats, at[9], (2, rows)),
         view(floats, at[10], (R * n + 2 * R + (4 + N) * n,)),
         view(floats, at[11], (n * n + 2 * n + 5 * n,)),
         view(floats, at[12], (N, 4, 4)),
@@ -142,14 +145,18 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[27], (1, 4, 4)),
         view(integers, at[28], (room,)),
         view(integers, at[29], (sizes[11],)),
-        view(integers, at[30], (N + 1,)),
-        view(integers, at[31], (3 * n + (N + 1) * (3 + 2 * n + R),)),
-        view(integers, at[32], (3 * n + 2 * (3 + 3 * n),)),
+        view(integers, at[30], (N + 2,)),
+        view(integers, at[31], (3 * n + (N + 1) * (3 + 2 * n + R + soft),)),
+        view(integers, at[32], (3 * n + 2 * (3 + 3 * n + soft),)),
         view(integers, at[33], (3, n)),
         view(integers, at[34], (N, 3)),
         view(integers, at[35], (3,)),
-        view(floats, at[36], (sizes[15] + sizes[16] * room,)),
-        view(integers, at[37], (sizes[16] * room + 2,)),
+        view(floats, at[36], (sizes[14],)),
+        view(floats, at[37], (N + 2,)),
+        view(integers, at[38], (sizes[15],)),
+        view(integers, at[39], (2,)),
+        view(floats, at[40], (sizes[20] + sizes[21] * room,)),
+        view(integers, at[41], (sizes[21] * room + 2,)),
     )
 
 

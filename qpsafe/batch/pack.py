@@ -14,6 +14,7 @@ from qpsafe.batch.knots import Path, Refused, path_of
 from qpsafe.danger.activation import Activation, Threshold
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
+from qpsafe.geometry.clearance_work import MOST, sizes_of
 from qpsafe.hqp.own.state import workspace
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.kinds import OTHER, WEIGHTED, kind_of, numbers_of
@@ -127,12 +128,16 @@ def pack(controller: SafetyController, horizon: float = HORIZON) -> Packed:
     counts = [len(task.rows) for task in tasks]  # type: ignore[attr-defined]
     rows = sum(counts)
     spots = 0 if controller.spots is None else len(controller.spots)
-    solver = [len(block) for block in workspace(n, max(rows, n) + n, rows + n)]
+    clearance = controller.clearance
+    solids = (np.zeros(0), np.zeros(0, dtype=np.int64)) if isinstance(clearance, str) else clearance.blocks
+    soft, kept = (0, (0, 0)) if isinstance(clearance, str) else (MOST, sizes_of(*clearance.size))
+    solver = [len(block) for block in workspace(n, max(rows, n) + n + soft, max(rows + n, soft))]
     sizes = np.array(
         (n, len(tasks), len(paths), spots, rows, len(controller.activation.levels), sum(len(p.times) for p in paths),
-         sum(len(p.events) for p in paths), robot.memory, len(robot.wire_frames), *solver, len(floats["gate"]),
-         len(whole["gate_whole"]), *(gate.sizes if gate else (0, 0, 0))), dtype=np.int64,
+         sum(len(p.events) for p in paths), robot.memory, len(robot.wire_frames), *solver, *map(len, solids), *kept,
+         soft, len(floats["gate"]), len(whole["gate_whole"]), *(gate.sizes if gate else (0, 0, 0))), dtype=np.int64,
     )  # fmt: skip
+    floats["solids"], whole["solids_whole"] = solids
     at, length, _ = lay_out(cuts.shared, sizes)
     at_own, *own_sizes = lay_out(cuts.own, sizes)
     head = np.concatenate((sizes, at, at_own))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,9 @@ from qpsafe.compiled.memory import view
 from qpsafe.danger import activation, push
 from qpsafe.danger.activation import multiply_compiled, switch_compiled
 from qpsafe.danger.evasion import filter_by
+from qpsafe.geometry import clearance_kernel
+from qpsafe.geometry.clearance_kernel import clearance_rows
+from qpsafe.geometry.clearance_work import cut_rows
 from qpsafe.hqp.own import regimes
 from qpsafe.hqp.own.solver import MODULES
 from qpsafe.laws import damping, hierarchical
@@ -47,6 +50,7 @@ from qpsafe.tasks.joint import TURN
 _sense_readings = linked(sense_readings, kinematics, push, readings, *push.USES, *readings.USES)
 _sense_points = linked(sense_points, kinematics, push, detection, *push.USES)
 _resolve_tick = linked(resolve_tick, kinematics, clik, limits_module, damping, regimes, *MODULES)
+_clearance_rows = linked(clearance_rows, *clearance_kernel.USES)
 _filter_by = linked(filter_by)
 _parts, _given = inline(parts), inline(given)
 
@@ -55,7 +59,8 @@ _parts, _given = inline(parts), inline(given)
 USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
     limits_module, braking, resolve_kernel, sense_kernel, stall, steps, kinematics, speed_cap, units, clik, offset,
-    detection, readings, push, damping, regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
+    detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES,
+    regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 
 
@@ -136,13 +141,32 @@ def gentle(p: Any, s: Any, w: Any) -> bool:
 
 
 @inline
+def keep_clear(p: Any, s: Any, w: Any, memory: Array, limits: Array, dt: float) -> None:
+    """Rows that keep the robot clear of furniture and itself, above the tasks."""
+    count = 0
+    if p.solids.shape[0] > 0:
+        count = _clearance_rows(
+            memory, s.qd, limits, dt, p.solids, p.solids_whole, w.clearance, w.clearance_whole
+        )  # fmt: skip
+    w.soft[0], w.soft[1] = min(count, 1), count
+    if count > 0:
+        n = s.q.shape[0]
+        rows = cut_rows(w.clearance, w.clearance_whole, n, p.solids_whole[2])
+        for row in range(count):
+            copy(rows.A[row], w.matrix[row])
+            w.target[0, row], w.target[1, row] = -inf, rows.high[row]
+        w.last[0] = count
+
+
+@inline
 def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[float, float]:
     """The second half of a tick: from references and q̇0 to `command`, see `resolve_tick`."""
     n, tasks, k = s.q.shape[0], p.gains.shape[0], i[WIRE_ENDS]
     limits, dt, return_speed = p.limits, p.numbers[code.DT], p.numbers[code.RETURN_SPEED]
-    if s.marks[code.PHASE] == RECOVERING and gentle(p, s, w):
-        limits = p.gentle
     supports, memory = view(f, i[SUPPORTS], (n + 1, n)), view(w.memory, 0, (w.memory.shape[0],))
+    keep_clear(p, s, w, memory, limits, dt)
+    if s.marks[code.PHASE] == RECOVERING and w.soft[1] == 0 and gentle(p, s, w):
+        limits = p.gentle
     if s.marks[code.WAY] == 0:
         gains, standing, _, _, weights, _, qd0 = _given(w.given, n, tasks)
         copy(p.gains, gains)
@@ -158,13 +182,14 @@ def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[f
         excess, worst = _resolve_tick(
             s.q, s.qd, memory, supports, k, p.bodies, p.placements, p.rows, w.given, limits, dt,
             return_speed, p.numbers[code.DAMPING] if kind == STRICT else nan, p.numbers[code.DAMPING_TIME], w.solver,
-            w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.floats, w.integers, w.command,
+            w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.near,
+            w.soft, w.floats, w.integers, w.command,
         )  # fmt: skip
         if kind != STRICT:
             excess, worst = law_compiled(
                 kind, p.numbers[code.DAMPING], p.numbers[code.DAMPING_TIME], p.importance, s.activations, dt, w.given,
-                w.solver, w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.floats,
-                w.integers, w.command,
+                w.solver, w.solver_whole, p.whole[code.LARGEST], w.matrix, w.target, w.last, p.ends, w.near,
+                w.soft, w.floats, w.integers, w.command,
             )  # fmt: skip
         return excess, worst
     # back through the joints: one task on all of them, whose rows stand already
@@ -187,7 +212,7 @@ def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[f
         s.q, s.qd, memory, supports, k, view(p.nowhere, n, (1,)), w.way_placement, view(p.nowhere, 0, (n,)),
         w.way_given, limits, dt, return_speed, p.numbers[code.WAY_DAMPING], p.numbers[code.WAY_DAMPING_TIME],
         w.solver, w.solver_whole, p.whole[code.LARGEST_WAY], w.matrix, w.target, w.last, view(p.nowhere, n + 1, (1,)),
-        w.way_floats, w.way_integers, w.command,
+        w.near, w.soft, w.way_floats, w.way_integers, w.command,
     )  # fmt: skip
 
 

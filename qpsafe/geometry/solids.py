@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.geometry import layout
 from qpsafe.geometry.hull import Hull
 from qpsafe.geometry.layout import frozen
@@ -43,6 +45,7 @@ class Solids:
             Things carried are in none: they touch furniture where they are picked up and put down.
         own: Pairs of the robot's shapes, its base and what it carries included, on bodies that are neither the same nor
             joined, apart at home, (m, 2).
+        known: How many known obstacles there are: the last shapes.
     """
 
     names: tuple[str, ...]
@@ -55,6 +58,7 @@ class Solids:
     robot: Index
     furniture: Index
     own: Index
+    known: int
 
     @property
     def solid(self) -> tuple[Index, Array, Array, Index, Index, Array]:
@@ -76,14 +80,14 @@ class Solids:
             carried: What the tool carries, by the frame it is fixed to and in its axes.
 
         Raises:
-            ConfigurationError: The robot has no such frame.
+            ConfigurationError: The robot has no such frame, or a hull no volume.
             RobotFileError: The robot's collision geometry cannot be read.
         """
         own = list(body_hulls(robot))
         for frame, things in ({} if carried is None else carried).items():
             own += [fixed_to(robot, frame, thing) for thing in things]
         placed = [*own, *((0, thing.name, thing.vertices) for thing in known)]
-        hulls = [Hull.of(np.asarray(vertices, dtype=float)) for _, _, vertices in placed]
+        hulls = [_hull(name, np.ascontiguousarray(vertices, dtype=float)) for _, name, vertices in placed]
         index = np.zeros((len(placed), layout.INTEGERS), dtype=np.int64)
         shapes = np.zeros((len(placed), layout.FLOATS))
         first = np.zeros(2, dtype=np.int64)
@@ -108,4 +112,21 @@ class Solids:
             robot=frozen(moving, np.int64),
             furniture=apart_at_home(solid, robot, pairs),
             own=own_pairs(solid, robot, of_robot),
+            known=len(known),
         )
+
+
+def _hull(name: str, vertices: Array) -> Hull:
+    from scipy.spatial import QhullError
+
+    try:
+        return _made(vertices.tobytes())
+    except QhullError:
+        expected = "vertices that span a volume [m]"
+        raise ConfigurationError("Solids", name, f"{len(vertices)} flat vertices", expected) from None
+
+
+@lru_cache(maxsize=512)
+def _made(vertices: bytes) -> Hull:
+    """Made once: many controllers have the same robot."""
+    return Hull.of(np.frombuffer(vertices).reshape(-1, 3))

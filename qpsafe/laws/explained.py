@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from itertools import accumulate, pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from qpsafe.hqp.solve import STATUS, note_of
 from qpsafe.laws.kinds import NULLSPACE, PAPER, WEIGHTED
 from qpsafe.laws.problem import LawResult
 from qpsafe.laws.weighted import into_one
+
+if TYPE_CHECKING:
+    from qpsafe.hqp.level import Level
 
 Array = NDArray[np.float64]
 
@@ -35,6 +38,7 @@ class Solved(NamedTuple):
         weights: Of the regimes; those without were not solved.
         counts: Rows of each task.
         taken: Time of the call [s].
+        soft: Levels above the tasks.
     """
 
     A: Array
@@ -48,6 +52,7 @@ class Solved(NamedTuple):
     weights: Sequence[float]
     counts: Sequence[int]
     taken: float
+    soft: tuple[Level, ...] = ()
 
 
 def explain(s: Solved, solved: bool, kind: int, importance: Array, activations: Sequence[float]) -> LawResult:
@@ -110,8 +115,25 @@ def hierarchy(s: Solved, kept: int, closing: Array | None = None) -> Packed:
     """
     counts, n = s.counts[:kept], len(s.qd0)
     rows = sum(counts)
-    low = np.concatenate((s.b[:rows], s.qd0 if closing is None else closing))
-    return Packed(np.concatenate((s.A[:rows], np.eye(n))), low, low, None, [*counts, n], s.lower, s.upper, False)
+    target = np.concatenate((s.b[:rows], s.qd0 if closing is None else closing))
+    return under(s, np.concatenate((s.A[:rows], np.eye(n))), target, [*counts, n])
+
+
+def under(s: Solved, A: Array, target: Array, counts: list[int]) -> Packed:
+    """Equality levels below the soft ones.
+
+    Args:
+        s: What there is.
+        A: (rows, n).
+        target: (rows,).
+        counts: Rows of each.
+    """
+    if not s.soft:
+        return Packed(A, target, target, None, counts, s.lower, s.upper, False)
+    low = np.concatenate([*(level.lower for level in s.soft), target])
+    high = np.concatenate([*(level.upper for level in s.soft), target])
+    A = np.concatenate([*(level.A for level in s.soft), A])
+    return Packed(A, low, high, None, [*(level.rows for level in s.soft), *counts], s.lower, s.upper, False)
 
 
 def paper_hierarchy(s: Solved, kept: int) -> Packed:
@@ -141,4 +163,4 @@ def weighted_level(s: Solved, importance: Array, activations: Sequence[float], k
     rows, n = len(s.b) + len(s.qd0), len(s.qd0)
     matrix, target = np.empty((rows, n)), np.empty(rows)
     into_one(s.A, s.b, list(accumulate(s.counts)), s.qd0, activations, importance, matrix, target)
-    return Packed(matrix, target, target, None, [rows], s.lower, s.upper, False)
+    return under(s, matrix, target, [rows])

@@ -26,10 +26,10 @@ from qpsafe.laws.nullspace import blend_compiled
 from qpsafe.laws.projections import regimes_compiled
 from qpsafe.laws.weighted import into_one_compiled
 from qpsafe.pipeline import resolve_kernel
-from qpsafe.pipeline.resolve_kernel import cut_given, cut_parts, sent
+from qpsafe.pipeline.resolve_kernel import cut_given, cut_parts, layout_types, sent
 from qpsafe.robot.kinematics import Index
 
-_one, _ints = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
+_one = types.Array(types.float64, 1, "C", readonly=True)
 _out, _out_ints = types.float64[::1], types.int64[::1]
 #: All the code that goes into the kernel.
 USES = (
@@ -41,14 +41,14 @@ USES = (
 @entry(
     types.UniTuple(types.float64, 2)(
         types.int64, types.float64, types.float64, _one, _one, types.float64, _out,
-        _out, _out_ints, types.int64, types.float64[:, ::1], _out, _out_ints, _ints, _out, _out_ints, _out,
+        *layout_types, _out, _out_ints, _out,
     ),
     *USES,
 )  # fmt: skip
 def law_tick(
     kind: int, damping: float, damping_time: float, importance: Array, activations: Array, dt: float, block: Array,
-    work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index,
-    floats: Array, integers: Index, command: Array,
+    work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index, levels: Array,
+    soft: Index, floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill the law's part of floats and integers, see `Parts`, and command.
 
@@ -58,7 +58,8 @@ def law_tick(
         activations: (tasks,).
         dt: Tick [s].
         block: What `given` cuts, with gains, weights and q̇0.
-        work, int_work, m, matrix, target, last, ends: A `Layout` of the solver, of one level where the law is weighted.
+        work, int_work, m, matrix, target, last, ends, levels, soft: A `Layout` of the solver, of one level where the
+            law is weighted.
         floats, integers: As `resolve_tick` left them.
         command: (n,), q̇ inside the box.
 
@@ -72,10 +73,15 @@ def law_tick(
     for level in range(tasks + 1):
         near[level] = 0.0
     if kind == WEIGHTED:
-        into_one_compiled(A, b, ends, qd0, activations, importance, matrix, target)
-        last[0] = n + ends[tasks - 1]
+        rows, first = n + ends[tasks - 1], soft[1]
+        into_one_compiled(
+            A, b, ends, qd0, activations, importance, view(matrix, first * n, (rows, n)),
+            view(target, target.shape[1] + first, (rows,)),
+        )  # fmt: skip
+        last[soft[0]] = first + rows
         solve_levels(
-            work, int_work, m, matrix, target, last, 1, bounds[0], bounds[1], near, x[0], view(info, 0, (width,))
+            work, int_work, m, matrix, target, last, levels, soft, 1, bounds[0], bounds[1], near, x[0],
+            view(info, 0, (width,)),
         )  # fmt: skip
         for j in range(n):
             blend[j] = x[0, j]
@@ -96,8 +102,9 @@ def law_tick(
         for kept in range(most + 1):
             if weights[kept] > 0.0:
                 solve_regime(
-                    work, int_work, m, matrix, target, last, ends, A, b, min(kept, 1), x[kept] if kept > 1 else qd0,
-                    bounds[0], bounds[1], near, x[kept], view(info, kept * width, (width,)),
+                    work, int_work, m, matrix, target, last, ends, levels, soft, A, b, min(kept, 1),
+                    x[kept] if kept > 1 else qd0, bounds[0], bounds[1], near, x[kept],
+                    view(info, kept * width, (width,)),
                 )  # fmt: skip
     blend_compiled(weights, view(x, 0, (most + 1, n)), blend)
     return sent(blend, bounds, codes, info, dt, command)

@@ -6,12 +6,17 @@ A part never changes, see `qpsafe.fixed`; another one may take its place, and co
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.gate.pack import surroundings
 from qpsafe.gate.rules import VerifiedMotion
+from qpsafe.geometry.clearance import ClearanceLimit, checked_clearance
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law
 from qpsafe.limits import JointLimits, checked_limits
@@ -25,15 +30,19 @@ from qpsafe.pipeline.checks import (
     checked_law,
 )
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.sensing.spots import SpotArray
+from qpsafe.sensing.units import UnitWatch
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.gate.gate import Gate
+    from qpsafe.hqp.level import Level
     from qpsafe.pipeline.stages import Stages
     from qpsafe.robot.robot import Robot
+    from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
 
@@ -41,8 +50,9 @@ class Parts:
     """The parts of a `SafetyController`.
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`; what
-    does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`,
+    `clearance`, `gate`; what does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by
+    `set_tasks`.
     """
 
     _robot: Robot
@@ -61,8 +71,14 @@ class Parts:
     _barrier: DangerBarrier | None
     _gate: VerifiedMotion | None
     _stages: Stages
+    _clearance: ClearanceLimit | None
+    _known: Sequence[Obstacle]
+    _carried: Mapping[str, Sequence[Obstacle]] | None
     _recovery_rules: RecoveryRules
     _recovery: Recovery
+    _units: UnitWatch
+    _qd: NDArray[np.float64]
+    _qd_before: NDArray[np.float64]
 
     def __repr__(self) -> str:
         return call(self, self._robot.name, self._labels, self._law, dt=self._dt, phase=self._recovery.phase)
@@ -175,6 +191,17 @@ class Parts:
         self._gate = checked_gate(gate)
 
     @property
+    def clearance(self) -> ClearanceLimit | Literal["off"]:
+        """How near the robot may come to furniture, to what it carries and to itself."""
+        return "off" if self._clearance is None else self._clearance
+
+    @clearance.setter
+    def clearance(self, clearance: ClearanceLimit | str | None) -> None:
+        self._clearance = checked_clearance(
+            clearance, self._robot, lambda: surroundings(self._robot, self._known, self._carried)[0]
+        )
+
+    @property
     def recovery_rules(self) -> RecoveryRules:
         """How the robot returns to its path after danger."""
         return self._recovery_rules
@@ -206,8 +233,17 @@ class Parts:
 
     def __copy__(self) -> Self:
         """A run of its own that goes on from here, as a deep copy is; parts that do not change are shared."""
-        shared = (self._robot, *self._tasks, self._law, self._field, self._activation, self._spots, self._rules)
+        shared = (
+            self._robot, *self._tasks, self._law, self._field, self._activation, self._spots, self._rules,
+            self._clearance,
+        )  # fmt: skip
         return copy.deepcopy(self, {id(part): part for part in shared})
+
+    def acknowledge(self) -> None:
+        """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
+        if self._sensing is not None:
+            self._sensing.acknowledge()
+        self._units.acknowledge()
 
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
@@ -216,3 +252,15 @@ class Parts:
     def resume(self) -> None:
         """Let the path's clock run again."""
         self._recovery.paused = False
+
+    @property
+    def _acceleration(self) -> NDArray[np.float64]:
+        """That led to the commanded velocity (n,) [rad/s²]."""
+        return (self._qd - self._qd_before) / self._dt
+
+    def _kept_clear(self, commanded: RobotState) -> tuple[Level, ...]:
+        """Rows that keep the robot clear of furniture and itself; none where nothing can come too near."""
+        if self._clearance is None or self._limits is None:
+            return ()
+        rows = self._clearance.level(commanded, self._qd, self._limits)
+        return () if rows is None else (rows,)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.hqp.own.regimes import MOST_LAYOUTS, layout_for
+from qpsafe.hqp.own.regimes import MOST_LAYOUTS, MOST_SOFT, layout_for
 from qpsafe.hqp.solution import SOLVED
 from qpsafe.laws.explained import Solved, explain
 from qpsafe.laws.hierarchical import weigh
@@ -51,8 +51,8 @@ class Resolved:
         box: Admissible velocities, if they are known already.
         result: The law's answer, likewise.
         frozen: Else they are made from the results of `resolve_tick`, the evasive velocity, the regimes' weights, the
-            rows of each task, the time it took [s], kind, weights and activations of the law for `explain`, and
-            whether there are limits.
+            rows of each task, the time it took [s], kind, weights and activations of the law for `explain`, whether
+            there are limits, and the soft levels.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Resolved:
     @cached_property
     def box(self) -> Box | None:
         """Admissible velocities; None without limits."""
-        if self._frozen is None or not self._frozen[-1]:
+        if self._frozen is None or not self._frozen[-2]:
             return self._box
         return Box(*self._parts.bounds, *self._parts.codes)
 
@@ -80,11 +80,16 @@ class Resolved:
         """The law's answer; None if it was not asked."""
         if self._result is not None or self._frozen is None:
             return self._result
-        cut, (_, _, qd0, weights, counts, taken, how, _) = self._parts, self._frozen
+        cut, (_, _, qd0, weights, counts, taken, how, _, soft) = self._parts, self._frozen
         solved = Solved(
-            cut.A, cut.b, qd0, cut.bounds[0], cut.bounds[1], cut.blend, cut.x, cut.info, weights, counts, taken
-        )
+            cut.A, cut.b, qd0, cut.bounds[0], cut.bounds[1], cut.blend, cut.x, cut.info, weights, counts, taken, soft
+        )  # fmt: skip
         return explain(solved, self.solved, *how)
+
+    @property
+    def soft(self) -> tuple[Level, ...]:
+        """Levels under the joint limits, before the first task."""
+        return () if self._frozen is None else self._frozen[-1]
 
     @cached_property
     def errors(self) -> tuple[Array, ...]:
@@ -149,12 +154,20 @@ class Resolve:
         """  # fmt: skip
         begin = perf_counter()
         counts, asked = self._take(state, samples)
-        made = self._layouts.get(counts)
+        ours = self._kind != OTHER and limits is not None
+        count = 0
+        if soft:
+            ours = ours and len(soft) <= MOST_SOFT and all(level.weight is None for level in soft)
+            count = sum(level.rows for level in soft) if ours and self._kind != NULLSPACE else 0
+        room = -(-count // _ROOM) * _ROOM
+        made = self._layouts.get((room, *counts))
         if made is None:
             if len(self._layouts) >= MOST_LAYOUTS:  # a task whose rows change for ever
                 self._layouts.clear()
-            made = self._layouts[counts] = self._laid_out(counts)
+            made = self._layouts[(room, *counts)] = self._laid_out(counts, room)
         rows, layout, sizes = made
+        if count:
+            layout.fill(soft)
         command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
         plain = type(limits) is JointLimits and limits.max_jerk is None
         if asked or not plain:
@@ -163,7 +176,6 @@ class Resolve:
                 box = checked_box(box, limits, state.q, qd)
             self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        ours = self._kind != OTHER and limits is not None and not soft
         self._qd0[:], weights = qd0, weigh(activations, self._weights).tolist()
         damping = self._numbers[:2] if ours and self._kind == STRICT else (np.nan, np.nan)
         excess, worst = resolve_tick(
@@ -178,7 +190,7 @@ class Resolve:
         if excess < 0.0:
             raise ValueError(f"the law returned a velocity that is not finite or absurd: {command}")
         taken, how = perf_counter() - begin, (self._kind, self._numbers[2], activations)
-        frozen = (floats, integers, qd0, weights, counts, taken, how, limits is not None)
+        frozen = (floats, integers, qd0, weights, counts, taken, how, limits is not None, soft)
         if ours:
             if not plain:  # whatever limits of another making do to it
                 check_command(command, self._dt)
@@ -206,12 +218,13 @@ class Resolve:
             counts.append(len(asked[k].velocity))
         return tuple(counts), asked
 
-    def _laid_out(self, counts: tuple[int, ...]) -> tuple[Any, ...]:
+    def _laid_out(self, counts: tuple[int, ...], room: int) -> tuple[Any, ...]:
         """For tasks of these numbers of rows: which rows of a pose each is, memory of the solver, sizes of results."""
         kinds = [rows if rows is not None else (0,) * count for rows, count in zip(self._rows, counts, strict=True)]
         rows = np.array([row for kind in kinds for row in kind], dtype=np.int64)
         n = self._robot.nq
-        return rows, layout_for(n, counts, self._kind == WEIGHTED), sizes_of(n, len(rows), len(counts) + 1)
+        layout = layout_for(n, counts, self._kind == WEIGHTED, room)
+        return rows, layout, sizes_of(n, len(rows), len(counts) + 1, room)
 
     @staticmethod
     def _fill(cut: Parts, asked: dict[int, Clik], counts: tuple[int, ...], box: Box | None) -> None:
@@ -230,7 +243,7 @@ class Resolve:
         self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]
     ) -> Resolved:
         """Ask a law of another making, or for what the compiled call does not know."""
-        cut, (_, _, qd0, _, counts, *_, limited) = made._parts, made._frozen  # type: ignore[misc]
+        cut, (_, _, qd0, _, counts, *_, limited, _) = made._parts, made._frozen  # type: ignore[misc]
         pairs = list(pairwise([0, *accumulate(counts)]))
         wishes = tuple([TaskVelocity(cut.A[a:b].copy(), cut.b[a:b].copy()) for a, b in pairs])
         corrections = tuple([task.gain * cut.e[a:b] for task, (a, b) in zip(self.parts[0], pairs, strict=True)])
@@ -245,6 +258,7 @@ class Resolve:
 
 
 _NO_LIMITS = np.empty((0, 0))
+_ROOM = 16  # memory is made for soft rows by so many
 
 
 def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:

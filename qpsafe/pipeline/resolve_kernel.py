@@ -39,7 +39,7 @@ class Parts(NamedTuple):
         bounds: Box, lower and upper (2, n).
         blend: The law's q̇ (n,).
         codes: Kinds of the box's limits, lower, upper, sacrificed (3, n).
-        info: What the solver says of each regime (regimes, 3 + 2 n + rows).
+        info: What the solver says of each regime (regimes, 3 + 2 n + rows, soft ones among them).
     """
 
     A: Array
@@ -73,19 +73,20 @@ def parts(floats: Array, integers: Index, n: int, rows: int, kinds: int) -> tupl
         view(floats, c, (2, n)),
         view(floats, c + 2 * n, (n,)),
         view(integers, 0, (3, n)),
-        view(integers, 3 * n, (kinds, HEADER + 2 * n + rows)),
+        view(integers, 3 * n, (kinds, (integers.shape[0] - 3 * n) // kinds)),
     )
 
 
-def sizes_of(n: int, rows: int, kinds: int) -> tuple[int, int]:
+def sizes_of(n: int, rows: int, kinds: int, soft: int = 0) -> tuple[int, int]:
     """How many floats and integers these are.
 
     Args:
         n: Joints.
         rows: Of all tasks.
         kinds: Regimes.
+        soft: Rows of soft levels.
     """
-    return rows * n + 2 * rows + (3 + kinds) * n, 3 * n + kinds * (HEADER + 2 * n + rows)
+    return rows * n + 2 * rows + (3 + kinds) * n, 3 * n + kinds * (HEADER + 2 * n + rows + soft)
 
 
 def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
@@ -113,6 +114,10 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
 cut_parts, cut_given = inline(parts), inline(given)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
 _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.float64[::1], types.int64[::1]
+#: Of a `Layout`.
+layout_types = (
+    _out, _out_ints, types.int64, types.float64[:, ::1], types.float64[:, ::1], _out_ints, _ints, _out, _ints,
+)  # fmt: skip
 
 
 @inline
@@ -134,7 +139,7 @@ def sent(blend: Array, bounds: Array, codes: Index, info: Index, dt: float, comm
     types.UniTuple(types.float64, 2)(
         _any, _any, _one, _two, types.int64, _ints, _three, _ints, types.float64[::1], readable(2), types.float64,
         types.float64, types.float64, types.float64,
-        _out, _out_ints, types.int64, types.float64[:, ::1], _out, _out_ints, _ints, _out, _out_ints, _out,
+        *layout_types, _out, _out_ints, _out,
     ),
     kinematics, clik, limits_module, laws_damping, regimes, *MODULES,
 )  # fmt: skip
@@ -142,8 +147,8 @@ def resolve_tick(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
     block: Array, limits: Array, dt: float, return_speed: float, damping: float,
     damping_time: float,
-    work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index,
-    floats: Array, integers: Index, command: Array,
+    work: Array, int_work: Index, m: int, matrix: Array, target: Array, last: Index, ends: Index, levels: Array,
+    soft: Index, floats: Array, integers: Index, command: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill floats and integers (see `Parts`), command.
 
@@ -156,7 +161,7 @@ def resolve_tick(
         limits: Lower, upper, velocity, acceleration (4, n), or (0, n) where the box stands already.
         dt, return_speed: Of the limits.
         damping, damping_time: Of the law; NaN where it is of another making and will be asked afterwards.
-        work, int_work, m, matrix, target, last, ends: A `Layout` of the solver.
+        work, int_work, m, matrix, target, last, ends, levels, soft: A `Layout` of the solver.
         floats, integers: Results, zeros but for what stands already.
         command: (n,), q̇ inside the box.
 
@@ -184,7 +189,7 @@ def resolve_tick(
         return 0.0, 0.0
     # regimes of the law within the box, blended
     solve_regimes(
-        work, int_work, m, matrix, target, last, ends, A, b, weights, qd0, bounds[0], bounds[1], near, x, info,
-        blend,
+        work, int_work, m, matrix, target, last, ends, levels, soft, A, b, weights, qd0, bounds[0], bounds[1], near, x,
+        info, blend,
     )  # fmt: skip
     return sent(blend, bounds, codes, info, dt, command)

@@ -1,0 +1,144 @@
+"""Clearance as rows of the QP: the robot does not come nearer to furniture, floor, what it carries or itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.fixed import Fixed
+from qpsafe.geometry.clearance_kernel import clearance_rows
+from qpsafe.geometry.clearance_level import ClearanceLevel
+from qpsafe.geometry.clearance_work import rows_of, sizes_of
+from qpsafe.geometry.measure import pairs_of
+from qpsafe.geometry.nearness import blocks_of, tables_of
+from qpsafe.geometry.never import never_nearer
+from qpsafe.geometry.solids import Solids
+from qpsafe.text.words import call, counted
+
+if TYPE_CHECKING:
+    from qpsafe.limits import JointLimits
+    from qpsafe.robot.robot import Robot
+    from qpsafe.robot.state import RobotState
+
+Array = NDArray[np.float64]
+MARGIN = 0.004  # the nominal work of the third experiment comes within 8 mm of a plate [m]
+
+
+class ClearanceLimit(Fixed):
+    """Keeps the robot a margin away from known obstacles, from what it carries and from itself.
+
+    A pair of points of two convex shapes at the distance d, with the normal n from one to the other, comes nearer by
+    nᵀ J q̇. It has two rows, with s = d - margin:
+
+        (1)  nᵀ J q̇ <= the exact discrete `stopping_speed` of s at the deceleration Σ_j |nᵀ J|_j a_j
+        (2)  Σ_j (nᵀ J)_j φ_j(q̇_j) <= s,   φ_j = `stopping_way`, linearised within what the tick can reach
+
+    (1) says that the pair can be stopped in time when all joints go against the row together. That alone promises
+    nothing: a joint near its own limits cannot, and a robot that brakes does not, since each joint then stops at its
+    own a_j in its own time. (2) says that it stops in time when it brakes. With one joint in motion (2) is the
+    stricter one, with the deceleration |nᵀ J| a; without (1), retreat that braking will end could be traded for
+    approach now. See `clearance_kernel` for the lines.
+
+    **What is promised**, with n and J held: whoever obeys the rows stays the margin away and, when he brakes at the
+    limits of all joints, ends there too; going against the row with every joint obeys both rows at the next tick, so
+    one pair is never in conflict with itself. **What is not**: n and J turn while the arm moves, joints that stop
+    earlier than others may lead nearer half-way, limits of position and velocity may keep a joint from going against
+    the row, rows of several pairs may conflict, and a tick has 16 rows at most, those with the least room. That is what
+    the gate looks at, along the whole braking motion.
+
+    Rows are soft, directly under the joint limits: a tick always has a solution. What is nearer than the margin is led
+    away at 0.05 m/s. Pairs that cannot come nearer than the margin before the joints stand have no row, nor has a row
+    that no velocity of the next tick can break. Pairs nearer than 0.05 m have several: of further vertices that lean
+    towards the other shape, each with its own distance and normal, so that q̇ does not jump where the nearest point
+    does.
+
+    Laws by projections, `NullspaceLaw`, know no inequalities: they ignore these rows too.
+
+    Args:
+        robot: The robot.
+        solids: It, what it carries and known obstacles.
+        margin: How near they may come [m], >= 0.
+
+    Raises:
+        ConfigurationError: The margin is no such number, or the solids are of another robot.
+    """
+
+    fixed = frozenset(("solids", "margin", "blocks", "size"))
+
+    def __init__(self, robot: Robot, solids: Solids, margin: float = MARGIN) -> None:
+        if not (isinstance(margin, int | float) and 0.0 <= margin < math.inf):
+            raise ConfigurationError("ClearanceLimit", "margin", margin, "a finite distance >= 0 [m]")
+        if not isinstance(solids, Solids):
+            raise ConfigurationError("ClearanceLimit", "solids", solids, "Solids.of(robot, ...)")
+        self.solids, self.margin = solids, float(margin)
+        never = never_nearer(solids, robot, self.margin)
+        own = [pair for pair in map(tuple, solids.own.tolist()) if pair not in never]
+        pairs = np.vstack((solids.furniture, pairs_of(own)))
+        #: For compiled code, see `nearness.tables_of`.
+        self.blocks = blocks_of(solids, robot, pairs, self.margin)
+        self._pairs = tables_of(*self.blocks).pairs
+        #: Joints and shapes.
+        self.size = robot.nq, len(solids.names)
+        self._memory: tuple[Array, NDArray[np.int64]] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy makes memory of its own: views of this one would be torn from it."""
+        return {**self.__dict__, "_memory": None, "_rows": None}
+
+    def __repr__(self) -> str:
+        words = counted(len(self._pairs), "pair")
+        return call(self, words, margin=self.margin)
+
+    def level(self, state: RobotState, qd: Array, limits: JointLimits) -> ClearanceLevel | None:
+        """The rows of a tick; None where nothing can come too near.
+
+        Args:
+            state: Commanded configuration.
+            qd: Commanded velocity (n,) [rad/s].
+            limits: Joint limits of the tick.
+        """
+        if self._memory is None:
+            a, b = sizes_of(*self.size)
+            self._memory = np.zeros(a), np.zeros(b, dtype=np.int64)
+            self._rows = rows_of(*self._memory, *self.size)
+        count = clearance_rows(state.memory, qd, limits.table, limits.dt, *self.blocks, *self._memory)
+        if count == 0:
+            return None
+        rows = self._rows
+        A, high, gaps = rows.A[:count].copy(), rows.high[:count].copy(), rows.gaps[:count].copy()
+        return ClearanceLevel(A, high, gaps, self._pairs[rows.which[:count]], self.solids.names)
+
+
+def checked_clearance(
+    clearance: ClearanceLimit | str | None, robot: Robot, solids: Callable[[], Solids]
+) -> ClearanceLimit | None:
+    """What a `SafetyController` keeps clear by: the default for None, None for "off".
+
+    The default is none either where the robot's collision geometry cannot be read.
+
+    Args:
+        clearance: As given.
+        robot: Whose.
+        solids: Makes the solids of the default.
+
+    Raises:
+        ConfigurationError: It is no such limit, or one of a robot with another number of joints.
+    """
+    if isinstance(clearance, str) and clearance == "off":
+        return None
+    if clearance is None:
+        try:
+            return ClearanceLimit(robot, solids())
+        except RobotFileError:
+            return None
+    if not isinstance(clearance, ClearanceLimit):
+        raise ConfigurationError("SafetyController", "clearance", clearance, 'a ClearanceLimit or "off"')
+    if clearance.size[0] != robot.nq:
+        joints = counted(clearance.size[0], "joint")
+        raise ConfigurationError("SafetyController", "clearance", f"one for {joints}", f"one for {robot.nq}")
+    return clearance

@@ -1,0 +1,108 @@
+"""How far the robot's bodies can come until its joints stand, compiled: what cannot come near has no row."""
+
+from __future__ import annotations
+
+from math import floor, sqrt
+from typing import Any
+
+from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, inline
+from qpsafe.geometry.layout import BALL, BODY, PLANES, PLANES_FROM
+from qpsafe.geometry.nearness import FEW
+from qpsafe.robot.kinematics import place
+
+
+@inline
+def stopping_way(v: float, a: float, dt: float) -> float:
+    """How far a speed v >= 0 leads that is held for one tick and then reduced by a dt each tick, to 0.
+
+    The inverse of `stopping_speed`: dt Σ_{j=0..k} (v - j a dt) with k = floor(v/(a dt)). Convex in v, and v dt where v
+    is no more than a dt.
+    """
+    k = floor(v / (a * dt))
+    return dt * ((k + 1.0) * v - 0.5 * a * dt * k * (k + 1.0))
+
+
+@inline
+def prepare(t: Any, r: Any, poses: Array, twists: Array, qd: Array, limits: Array, dt: float) -> None:
+    """Lines of the joints, how far each body can come until it stands, and balls."""
+    n = qd.shape[0]
+    for j in range(n):
+        a = limits[3, j]
+        v, step = abs(qd[j]), a * dt
+        braked = max(v - step, 0.0)
+        now, after, most = stopping_way(v, a, dt), stopping_way(braked, a, dt), stopping_way(v + step, a, dt)
+        r.lines[0, j] = (most - after) / (v + step - braked)
+        r.lines[1, j] = after - r.lines[0, j] * braked
+        r.lines[2, j] = (now - after) / (v - braked) if v > braked else dt
+        r.lines[3, j] = r.lines[2, j] * braked - after
+        r.far[j], r.steps[j] = most, step
+        r.back[j] = max(step - v, 0.0) * dt
+    for b in range(1, n + 1):
+        c = place(poses[b], t.balls[b, 0], t.balls[b, 1], t.balls[b, 2])
+        r.balls[b, 0], r.balls[b, 1], r.balls[b, 2] = c
+        for j in range(n):
+            if t.supports[b, j] == 0.0 or t.balls[b, 3] < 0.0:
+                r.ways[b, j] = 0.0
+                continue
+            w = (twists[3, j], twists[4, j], twists[5, j])
+            v3 = add((twists[0, j], twists[1, j], twists[2, j]), 1.0, cross(w, c))
+            r.ways[b, j] = r.far[j] * (sqrt(dot(v3, v3)) + sqrt(dot(w, w)) * t.balls[b, 3])
+    r.balls[0, 0], r.balls[0, 1], r.balls[0, 2] = t.balls[0, 0], t.balls[0, 1], t.balls[0, 2]
+    for j in range(n):
+        r.ways[0, j] = 0.0
+    for i in range(t.index.shape[0]):
+        ball = t.shapes[i]
+        x, y, z = place(poses[t.index[i, BODY]], ball[BALL], ball[BALL + 1], ball[BALL + 2])
+        r.globes[i, 0], r.globes[i, 1], r.globes[i, 2] = x, y, z
+
+
+@inline
+def reach(t: Any, r: Any, a: int, b: int) -> float:
+    """How much nearer two bodies can come until both stand [m]: joints that move both do not count."""
+    way = 0.0
+    for j in range(r.far.shape[0]):
+        if t.supports[a, j] != t.supports[b, j]:
+            way += r.ways[a, j] + r.ways[b, j]
+    return way
+
+
+@inline
+def along_normal(
+    t: Any, r: Any, twists: Array, qd: Array, a: int, b: int, c: Vector, o: Vector, size: float, n: Vector
+) -> float:
+    """How far points of two bodies can come nearer along n until all joints stand, at most [m].
+
+    Args:
+        t, r, twists, qd: As for `clearance_rows`.
+        a, b: The bodies.
+        c, o: Centres of balls around the points.
+        size: The larger radius.
+        n: From the first to the second.
+    """
+    way = 0.0
+    for j in range(qd.shape[0]):
+        if t.supports[a, j] == t.supports[b, j]:
+            continue
+        w, v = (twists[3, j], twists[4, j], twists[5, j]), (twists[0, j], twists[1, j], twists[2, j])
+        across = cross(n, w)
+        wide = sqrt(dot(across, across)) * size
+        g = dot(n, add(v, 1.0, cross(w, c if t.supports[a, j] != 0.0 else o)))
+        if (t.supports[a, j] != 0.0) == (qd[j] < 0.0):
+            g = -g
+        most = g + wide
+        way += max(most * r.far[j], (wide - g) * r.back[j])
+    return way
+
+
+@inline
+def passes(t: Any, r: Any, twists: Array, qd: Array, a: int, shape: int, c: Vector, size: float, margin: float) -> bool:
+    """Whether a face of a known obstacle is out of reach of a ball (c, size) of body a, as it moves."""
+    first, count = t.index[shape, PLANES_FROM], t.index[shape, PLANES]
+    if count > FEW:
+        return False
+    for k in range(first, first + count):
+        n = (-t.planes[k, 0], -t.planes[k, 1], -t.planes[k, 2])
+        gap = t.planes[k, 3] - dot(n, c) - size - margin
+        if gap > 0.0 and gap > along_normal(t, r, twists, qd, a, 0, c, c, size, n):
+            return True
+    return False
