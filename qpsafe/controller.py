@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
+from qpsafe.danger.separation_limit import SeparationLimit, oldest
 from qpsafe.errors import in_words
 from qpsafe.gate.gated import NO_AGES, PASSED
 from qpsafe.gate.rules import VerifiedMotion
@@ -73,6 +74,7 @@ class SafetyController(Parts):
         barrier: A cap on the danger field, beyond the paper; none by default.
         gate: Figures of the last step, which lets through what of a command is verified: the default ones for None;
             "off" sends it as it is. Without limits it is off.
+        separation: Speed and separation monitoring above all tasks, for who has to argue by the standard; none by default.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -97,6 +99,7 @@ class SafetyController(Parts):
         barrier: DangerBarrier | None = None,
         recovery: RecoveryRules | None = None,
         gate: VerifiedMotion | str | None = None,
+        separation: SeparationLimit | None = None,
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
         self._dt = checked_dt("SafetyController", dt)
@@ -114,7 +117,7 @@ class SafetyController(Parts):
         if self._spots is not None:
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self._units = UnitWatch(self._spots, self._dt)
-        self.barrier, self.gate = barrier, gate
+        self.barrier, self.gate, self.separation = barrier, gate, separation
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
@@ -208,7 +211,7 @@ class SafetyController(Parts):
             self._q, self._active = np.array(here), True
             self._q.flags.writeable = False
             self._qd = self._qd_before = np.zeros(self._robot.nq)
-        barrier, recovery = self._barrier, self._recovery
+        barrier, separation, recovery = self._barrier, self._separation, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
         seen = self._stages.sense(self._sensing, self._field, self._evasion)(q, qd, distances, points, ages)
@@ -219,7 +222,8 @@ class SafetyController(Parts):
         commanded = RobotState(self._robot, self._q)
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
-            explained = seen.capped or not min(activations) >= 1.0 or (barrier is not None and len(seen.points) > 0)
+            capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
+            explained = seen.capped or not min(activations) >= 1.0 or capped
             still = float(np.abs(qd0).max()) < CALM
             stall.watch(self._seq, self._tasks, self._law, recovery, commanded, self._qd, explained, still)
         samples = recovery.update(cdf_n, commanded, activations)
@@ -233,10 +237,13 @@ class SafetyController(Parts):
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
         given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits)
-        if barrier is None:
+        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+        if barrier is None and separation is None:
             resolved = resolve(*given)
         else:
-            resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
+            caps, age = (separation, barrier), oldest(old, self._rules.max_age)
+            here = as_joint_position(q, self._robot)
+            resolved = self._stages.resolve_under(caps, here, seen, age, resolve, given)
         command = resolved.command
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
@@ -246,7 +253,7 @@ class SafetyController(Parts):
             command = slower(self._braking, self._qd)
         gated, gate = PASSED, self.verifies
         if gate is not None:
-            command, old = command.copy(), NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+            command = command.copy()
             gated = gate(self._q, self._qd, command, seen.points, old)
         messages = (*stall.messages, *messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law
@@ -23,6 +24,7 @@ from qpsafe.pipeline.checks import (
     checked_field,
     checked_gate,
     checked_law,
+    checked_separation,
 )
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
 from qpsafe.sensing.rules import SensingRules
@@ -41,8 +43,8 @@ class Parts:
     """The parts of a `SafetyController`.
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`; what does
-    not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`,
+    `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
     """
 
     _robot: Robot
@@ -60,6 +62,7 @@ class Parts:
     _sensing: DistanceSensing | None
     _barrier: DangerBarrier | None
     _gate: VerifiedMotion | None
+    _separation: SeparationLimit | None
     _stages: Stages
     _recovery_rules: RecoveryRules
     _recovery: Recovery
@@ -173,6 +176,15 @@ class Parts:
     @gate.setter
     def gate(self, gate: VerifiedMotion | str | None) -> None:
         self._gate = checked_gate(gate)
+
+    @property
+    def separation(self) -> SeparationLimit | None:
+        """Speed and separation monitoring: how fast any link may approach what is seen."""
+        return self._separation
+
+    @separation.setter
+    def separation(self, separation: SeparationLimit | None) -> None:
+        self._separation = checked_separation(separation)
 
     @property
     def recovery_rules(self) -> RecoveryRules:
