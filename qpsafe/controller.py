@@ -65,7 +65,7 @@ class SafetyController(Parts):
         dt: Tick [s]; the IRC5 wants 0.004.
         field: The danger field; the paper's weights by default.
         activation: Thresholds of the tasks; the robot's for one or two tasks (the paper's on the IRB 140).
-        evasion: The admittance (16).
+        evasion: The admittance (16); `Evasion.for_robot` by default, "paper" for M = 4, D = 20.
         limits: Joint limits, by default the robot's; "off" switches them off (to compare laws, never on a robot).
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
@@ -74,7 +74,7 @@ class SafetyController(Parts):
         barrier: A cap on the danger field, beyond the paper; none by default.
         gate: Figures of the last step, which lets through what of a command is verified: the default ones for None;
             "off" sends it as it is. Without limits it is off.
-        separation: Speed and separation monitoring above all tasks, for who has to argue by the standard; none by default.
+        separation: Speed and separation monitoring, above all tasks; none by default.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -90,7 +90,7 @@ class SafetyController(Parts):
         *,
         field: DangerField | None = None,
         activation: Activation | None = None,
-        evasion: Evasion | None = None,
+        evasion: Evasion | str | None = None,
         limits: JointLimits | str | None = None,
         spots: SpotArray | None = None,
         sensing: SensingRules | None = None,
@@ -108,7 +108,7 @@ class SafetyController(Parts):
         self._law = HierarchicalLaw() if law is None else checked_law(law)
         self._field = DangerField() if field is None else checked_field(field)
         self._activation = checked_activation(self._tasks, activation, robot)
-        self.evasion = Evasion.default(robot.nq, self._dt) if evasion is None else evasion
+        self.evasion = evasion
         self.limits = limits
         self._spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
         self._rules = SensingRules() if sensing is None else sensing

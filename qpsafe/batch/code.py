@@ -11,18 +11,18 @@ HEADS = 17
 
 #: Numbers of the rules and the law.
 (DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,
- WAY_DAMPING, WAY_DAMPING_TIME, WAY_GAIN, RETURN_SPEED) = range(17)  # fmt: skip
+ WAY_DAMPING, WAY_DAMPING_TIME, WAY_GAIN, RETURN_SPEED, CALM, DWELL) = range(19)  # fmt: skip
 #: Whole ones: whether paths are suspended at all, looks of the stall watch and ticks between two, ticks between two
 #: looks at units, how many spots may be out of order, rows of the largest level, of a way back through the joints too,
-#: and the law's number in `qpsafe.laws.kinds`.
-ENABLED, PATIENCE, EVERY, UNITS_EVERY, MOST, LARGEST, LARGEST_WAY, LAW = range(8)
+#: the law's number in `qpsafe.laws.kinds`, and whether tasks are held while they are suspended.
+ENABLED, PATIENCE, EVERY, UNITS_EVERY, MOST, LARGEST, LARGEST_WAY, LAW, HELD = range(9)
 #: Kinds of trajectories: one pose; at rest after its end; begun again at its end; known up to its end.
 FIXED, RESTS, CYCLES, ENDS = range(4)
 #: Floats of a knot of a trajectory: pose, twist, turn to the next knot and the turn's rate there.
 POSE, TWIST, TURN, TURN_RATE, KNOT = 0, 16, 22, 25, 28
 
-#: A robot's clock: time on the path, rate. A return: duration, time since its start.
-TIME, RATE = range(2)
+#: A robot's clock: time on the path, rate, how long danger has been small. A return: duration, time since its start.
+TIME, RATE, QUIET = range(3)
 DURATION, SINCE = range(2)
 #: A robot's marks.
 (SEQ, ACTIVE, CHANGED, PAUSED, PHASE, STATUS, REASON, NOTES, WAITS, KEPT_LEVELS, LED, WAY, WAY_PHASE, WAY_CHANGED,

@@ -24,7 +24,7 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
     """
     n, N, T, k, R, L, K, E = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5], sizes[6], sizes[7]
     return Shared(
-        view(floats, at[0], (17,)),
+        view(floats, at[0], (19,)),
         view(floats, at[1], (L, 4)),
         view(floats, at[2], (N, 4, 4)),
         view(floats, at[3], (N,)),
@@ -35,7 +35,7 @@ def shared(floats: Any, integers: Any, at: Any, sizes: Any) -> Shared:
         view(floats, at[8], (K,)),
         view(floats, at[9], (K, 28)),
         view(floats, at[10], (E,)),
-        view(integers, at[11], (8,)),
+        view(integers, at[11], (9,)),
         view(integers, at[12], (L,)),
         view(integers, at[13], (N,)),
         view(integers, at[14], (R,)),
@@ -68,7 +68,7 @@ def own(floats: Any, integers: Any, at: Any, sizes: Any) -> Own:
         view(floats, at[1], (n,)),
         view(floats, at[2], (n,)),
         view(floats, at[3], (n,)),
-        view(floats, at[4], (2,)),
+        view(floats, at[4], (3,)),
         view(floats, at[5], (N, 2)),
         view(floats, at[6], (3, N, 6)),
         view(floats, at[7], (2,)),
@@ -131,7 +131,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[16], (2, n)),
         view(floats, at[17], (n,)),
         view(floats, at[18], (N,)),
-        view(floats, at[19], (2,)),
+        view(floats, at[19], (3,)),
         view(floats, at[20], (N, 2)),
         view(floats, at[21], (2, N, 6)),
         view(floats, at[22], (2,)),
@@ -148,7 +148,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(integers, at[33], (3, n)),
         view(integers, at[34], (N, 3)),
         view(integers, at[35], (3,)),
-        view(floats, at[36], (sizes[15] + 2 * sizes[16] * room,)),
+        view(floats, at[36], (sizes[15] + sizes[16] * room,)),
         view(integers, at[37], (sizes[16] * room + 2,)),
     )
 

@@ -170,6 +170,7 @@ def _numbers(controller: SafetyController, paths: list[Path]) -> dict[str, Any]:
             rules.angular_speed, rules.joint_speed, rules.shortest, rules.tolerance, BEHIND * rules.tolerance,
             controller.rules.speed_cap, damping, damping_time, way.damping, way.damping_time,
             JointTask(FixedJoints(robot.home)).gain, limits.return_speed,
+            rules.calm * controller.activation.suspend_above, rules.dwell,
         ),
         "levels": [(level.start, level.end, level.delta, level.epsilon) for level in controller.activation.levels],
         "placements": [robot.mounting(task.frame)[1] for task in controller.tasks],  # type: ignore[attr-defined]
@@ -196,7 +197,7 @@ def _whole(controller: SafetyController, paths: list[Path], trajectories: list[A
         "whole": (
             rules.enabled, stall.patience, stall.every, controller._units.every,
             0 if sensing is None else sensing.health.most,
-            sum(counts) + n if kind == WEIGHTED else max(n, *counts), n, kind,
+            sum(counts) + n if kind == WEIGHTED else max(n, *counts), n, kind, rules.held,
         ),
         "counts": controller.activation.counts,
         "bodies": [robot.mounting(task.frame)[0] for task in tasks],  # type: ignore[attr-defined]

@@ -15,6 +15,7 @@ from qpsafe.tasks.joint import TURN
 from qpsafe.tasks.offset import displace_into
 
 _length, _return_time, _fading = inline(steps.length), inline(steps.return_time), inline(steps.fading)
+_quiet_after = inline(steps.quiet_after)
 _minimum_jerk, _run_out = inline(steps.minimum_jerk), inline(steps.run_out)
 START, SPEED_THEN, BEFORE = range(3)  # what is known of a task's offset
 
@@ -209,7 +210,7 @@ def update_way(p: Any, s: Any, w: Any, least: float) -> bool:
         square += offset[j] * offset[j]
     active, met = least >= 1.0, np.sqrt(square) <= p.numbers[code.TOLERANCE]
     of = (s.way_marks[code.PENDING] == 1 and active, met or not active, met)
-    phase, anew = _next_phase_of_way(s.marks[code.WAY_PHASE], s.marks[code.WAY_CHANGED] == 1, False, 0.0, of)
+    phase, anew = _next_phase_of_way(s.marks[code.WAY_PHASE], s.marks[code.WAY_CHANGED] == 1, False, False, 0.0, of)
     s.marks[code.WAY_CHANGED], s.marks[code.WAY_PHASE] = 0, phase
     if anew:
         s.way_marks[code.PENDING], s.way_marks[code.RETURNING] = 1, 0
@@ -249,7 +250,9 @@ def update(p: Any, s: Any, w: Any, cdf_n: float, least: float, goals: Array, twi
     of, before = (p, s, w), s.marks[code.PHASE]
     danger = p.whole[code.ENABLED] == 1 and not cdf_n <= p.numbers[code.SUSPEND]
     s.marks[code.WAITS] = 0
-    phase, anew = _next_phase(before, s.marks[code.CHANGED] == 1, danger, s.clock[code.TIME], of)
+    s.clock[code.QUIET] = _quiet_after(s.clock[code.QUIET], cdf_n, p.numbers[code.CALM], p.numbers[code.DT])
+    waits = s.clock[code.QUIET] <= p.numbers[code.DWELL]
+    phase, anew = _next_phase(before, s.marks[code.CHANGED] == 1, danger, waits, s.clock[code.TIME], of)
     s.marks[code.CHANGED], s.marks[code.PHASE] = 0, phase
     if anew:
         s.clock[code.RATE] = 0.0
@@ -269,6 +272,7 @@ def update(p: Any, s: Any, w: Any, cdf_n: float, least: float, goals: Array, twi
     pending = _any_pending(s)
     if pending:
         measure(p, w)
+    held = before == SUSPENDED and phase == SUSPENDED and (p.whole[code.HELD] == 1 or not danger)
     share = s.clock[code.RATE] if phase == FOLLOWING else 0.0
     if s.marks[code.WAITS] != 0 and not pending and share == 1.0:
         share = 0.0  # a reference that moved on would keep the tasks from the event they wait at
@@ -278,8 +282,8 @@ def update(p: Any, s: Any, w: Any, cdf_n: float, least: float, goals: Array, twi
             copy(w.goals[path, a], goals[k, a])
         for c in range(6):
             twists[k, c] = share * w.twists[path, c]
-        if phase == SUSPENDED:
+        if phase == SUSPENDED and not held:
             copy(w.offsets[k], s.offsets[BEFORE, k])
             s.tasks[k, code.KNOWN] = 1
         elif s.tasks[k, code.PENDING] == 1:
-            _reference(p, s, w, k, s.activations[k] >= 1.0, goals[k], twists[k])
+            _reference(p, s, w, k, s.activations[k] >= 1.0 and not held, goals[k], twists[k])

@@ -103,7 +103,7 @@ def _plan(
 @inline
 def _keep(s: Any, w: Any) -> None:
     """Remember the clocks, to set them back when the robot could not go along."""
-    w.clock[0], w.clock[1] = s.clock[0], s.clock[1]
+    copy(s.clock, w.clock)
     for k in range(s.tasks.shape[0]):
         copy(s.returns[k], w.returns[k])
         copy(s.tasks[k], w.tasks[k])
@@ -118,7 +118,8 @@ def _keep(s: Any, w: Any) -> None:
 
 @inline
 def _set_back(s: Any, w: Any, phase: int, way: int, way_phase: int) -> None:
-    s.clock[0], s.clock[1], s.marks[code.PHASE] = w.clock[0], w.clock[1], phase
+    copy(w.clock, s.clock)
+    s.marks[code.PHASE] = phase
     for k in range(s.tasks.shape[0]):
         copy(w.returns[k], s.returns[k])
         s.tasks[k, code.PENDING], s.tasks[k, code.RETURNING] = w.tasks[k, code.PENDING], w.tasks[k, code.RETURNING]

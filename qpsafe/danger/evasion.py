@@ -13,6 +13,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
 
 
@@ -86,8 +87,12 @@ def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
             after[i] += A[i, j] * before[j] + B[i, j] * sigma[j]
 
 
-#: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint where nothing else is said.
-DEFAULT_MASS, DEFAULT_DAMPING = 4.0, 20.0
+#: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint that were tuned on the first experiment.
+PAPER_MASS, PAPER_DAMPING = 4.0, 20.0
+#: The rule of `Evasion.for_robot`: shares of a joint's largest speed and of the time in which it gets there.
+SPEED_SHARE, TIME_SHARE = 0.5, 0.3
+SHORTEST_LEVER = 0.05  # of the longest one of the robot: no axis turns at no resistance, be nothing beside it
+CONFIGURATIONS = 32  # that a robot's levers are looked for in
 
 
 class Evasion:
@@ -122,9 +127,45 @@ class Evasion:
         return call(self, mass=np.diag(self._mass), damping=np.diag(self._damping), dt=self._dt)
 
     @classmethod
-    def default(cls, n: int, dt: float) -> Evasion:
-        """That of a controller which is given none, tuned on the first experiment."""
-        return cls(DEFAULT_MASS, DEFAULT_DAMPING, n, dt)
+    def paper(cls, n: int, dt: float) -> Evasion:
+        """M = 4, D = 20 for every joint, tuned on the first experiment by hand.
+
+        Args:
+            n: Number of joints.
+            dt: Sample time [s].
+        """
+        return cls(PAPER_MASS, PAPER_DAMPING, n, dt)
+
+    @classmethod
+    def for_robot(cls, robot: Robot, dt: float) -> Evasion:
+        """M and D from a robot's own limits and geometry; that of a controller which is given none.
+
+        Let ℓ_j be the longest lever of joint j, the largest |(J_(i-1) + J_i)_j| over its links and configurations: a
+        danger Δ at one point is a torque of Δ ℓ_j at most, see (14), (15). Then
+
+            D_j = Δ ℓ_j/(s v_j),    M_j = D_j b v_j/a_j = b Δ ℓ_j/(s a_j),
+
+        with Δ where the task of highest priority begins to be released, Δ(1-ε). So one point there turns a joint at
+        s = 1/2 of its largest speed v_j at most, two such points or twice the danger at all of it; beyond that the
+        limits would cut one joint and turn the direction of the evasion. The time constant M_j/D_j is b = 0.3 of the
+        v_j/a_j that the joint needs to its largest speed: the filter smooths, the acceleration limits set the pace.
+
+        Stability, of a point at rest at the distance d, CDF ~ 1/d: moving away takes force away, K = -∂σ/∂q >= 0, and
+        q̇0 = (M s + D)^-1 σ with q = q̇0/s is a passive loop, stable whatever K, M and D are. A delay T of sensors and
+        servos, and the pole D/M, take phase from it: with ω the frequency where |K/(s (M s + D))| = 1,
+        ω <= K/D <= s Σ_j v_j ℓ_j/d over the joints, it needs ω T + atan(ω M/D) < π/2. For the IRB 140 at d = 0.4 m,
+        where CDF is Δ, ω < 10 rad/s, M/D = 0.1 s, T = 0.02 s: 11° + 45°, a margin of 34° at least; `test_stability`
+        looks at the whole loop, its limits and its laws too.
+
+        Args:
+            robot: The robot.
+            dt: Sample time [s].
+        """
+        from qpsafe.danger.thresholds import robot_thresholds
+
+        torque = robot_thresholds(robot)[0].start * levers(robot)
+        damping = torque / (SPEED_SHARE * robot.max_velocity)
+        return cls(TIME_SHARE * damping * robot.max_velocity / robot.max_acceleration, damping, robot.nq, dt)
 
     @property
     def mass(self) -> NDArray[np.float64]:
@@ -184,6 +225,22 @@ class Evasion:
     def reset(self) -> None:
         """Forget the past: q̇0 = 0."""
         self._velocity = np.zeros_like(self._velocity)
+
+
+def levers(robot: Robot) -> NDArray[np.float64]:
+    """The longest lever of every joint (n,) [m], twice that for the far links: how much torque danger causes at most.
+
+    It is looked for at home and in configurations of the joints' whole range; none is shorter than `SHORTEST_LEVER` of
+    the longest one.
+    """
+    starts, stops = robot.wire_indices
+    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    rng = np.random.default_rng(0)
+    longest = np.zeros(robot.nq)
+    for q in (robot.home, *rng.uniform(lower, upper, (CONFIGURATIONS, robot.nq))):
+        J = robot.at(q).wire_jacobians()
+        longest = np.maximum(longest, np.linalg.norm(J[starts] + J[stops], axis=1).max(axis=0))  # (15)
+    return np.maximum(longest, SHORTEST_LEVER * longest.max())
 
 
 def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:

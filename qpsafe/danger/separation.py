@@ -69,8 +69,8 @@ class Separation:
 
         Args:
             distance: To a person, any shape [m].
-            held: For how long the speed is kept before another one can be commanded: S_p(v_max) + v_max held = d, so that
-                it is admissible still where it leads to [s].
+            held: For how long the speed is kept before another one can be commanded [s]: S_p(v_max) + v_max held = d,
+                so that it is admissible still where it leads to.
         """
         b = self.deceleration * (self.reaction_time + held) + self.person_speed
         room = np.asarray(distance, dtype=float) - self.standing

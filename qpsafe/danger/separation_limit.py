@@ -1,11 +1,13 @@
-"""Speed and separation monitoring as rows of a level: no link approaches a seen point faster than v_max of its distance.
+"""Speed and separation monitoring as rows of a level: no link approaches what is seen faster than v_max.
 
 For part i of a link, a capsule, and the seen point p_k,
 
     d = |p_k - a| - r,    n = (p_k - a)/|p_k - a|,    nᵀ J_i(a) q̇ <= v_max(d)        (math section 6)
 
-as `qpsafe.danger.link_parts` measures them. v_max >= 0: standing and moving away are always allowed, so
-the rows can be met by every robot that can stop; they are a soft level, since one that is too fast already cannot.
+as `qpsafe.danger.link_parts` measures them. v_max >= 0: standing and moving away are always allowed, so every robot
+that stands can meet the rows; they are a soft level, since one that is too fast already cannot. The speed counts that
+is kept for a whole tick: S_p(v) + v dt <= d. So it is admissible still at the end of the tick, and what the next tick asks
+for is reached by braking less than a_s: S_p(v) - S_p(v') = v' dt, and S_p' >= (v_h + v)/a_s.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -86,7 +87,7 @@ def _cut(points: Array, count: int) -> list[Array]:
     height = points @ axis
     cuts = np.linspace(height.min(), height.max(), count + 1)
     pieces = []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in pairwise(cuts):
         inside = [points[(height >= low) & (height <= high)]]
         for plane in (low, high):
             for a, b in edges:
@@ -125,7 +126,7 @@ def _capsule(points: Array) -> tuple[Array, float]:
 
 
 def _circles(points: Array, axes: Array) -> tuple[Array, Array]:
-    """Centres and radii of small cylinders along axes (k, 3) around points: moved towards the farthest (Badoiu, Clarkson)."""
+    """Centres, radii of small cylinders along axes (k, 3) around points, moved towards the farthest (Badoiu)."""
     flat = points - (axes @ points.T)[:, :, None] * axes[:, None]  # (k, v, 3)
     centres = 0.5 * (flat.min(axis=1) + flat.max(axis=1))
     every = np.arange(len(axes))

@@ -26,7 +26,7 @@ BISECTIONS = 5  # λ is found to 1/32
 
 #: What held a command back.
 NOTHING, PERSON_NEAR, SOLID_NEAR = 0, 1, 2
-#: `told` of a call: the share λ; what held it back; capsule or group; point or pair; what braking itself is short of [m].
+#: `told` of a call: the share λ; what held it back; capsule or group; point or pair; what braking is short of [m].
 SHARE, CAUSE, WHO, POINT, SHORT = range(5)
 TOLD = 5
 

@@ -1,19 +1,24 @@
 """Whether a command, and the braking after it, approaches somebody whom the robot could touch; compiled.
 
-Along the way no capsule's axis may come nearer to a seen point p than by v_s dt in a tick where its surface is within
-the ball R(t) around p. Three facts spare most ticks from being looked at:
+A person seen at p moves no faster than v_h. After a time t on the way, p is at any p' with |p' - p| <= u = v_h t, and
+a link whose surface is nearer to p than R(t) could touch somebody: it must not approach any such p' faster than v_s.
+With n from the nearest point of the capsule's axis to p, D its distance, (v, ω) the body's twist and B = v + ω × p the
+body's velocity field at p, the speed of approach to p' is n'ᵀ (v + ω × p'), where n' differs from n by an angle of
+θ at most, sin θ = u/D, since p - nearest(p) moves no farther than p does. So it is at most
 
-- A point of the axis of capsule c goes no faster than V = Σ_j L_cj |q̇_j|, and all speeds fall. So with the gap
-  g = D - r - R(t) > 0 nothing can be inside for a time g / (v_h + V), and with V <= v_s all is well for good.
-- D is the distance of p, as seen from the body, to a segment that stands still there: a convex function of a point that
-  moves. So the speed of approach s = -dD/dt grows no faster than that point's acceleration, however the nearest point
-  of the axis wanders. With ρ_j = L_cj + D its distance from the axis of joint j at most, W = Σ_j |q̇_j|,
+    S(u) = max_{∠(n', n) <= θ} n'ᵀ B + |ω| u,    and at most V = Σ_j L_cj |q̇_j|, the speed of any point of the axis.
 
-      ds/dt <= B = Σ_j a_j ρ_j + 3 W Σ_j |q̇_j| ρ_j
+Seen from the body the axis stands still, and the distance is a convex function of a point that moves: so the speed of
+approach grows no faster than that point's acceleration, however the nearest point wanders. With ρ_j = L_cj + D + u its
+distance from the axis of joint j at most, W = Σ_j |q̇_j|,
 
-  (of ω_j × (p - o_j): from q̈_j; from turning axes, W |q̇_j| ρ_j; from moving ones, together W Σ |q̇_j| ρ_j; from the
-  body's own turning, again W Σ |q̇_j| ρ_j). So s stays below v_s for a time (v_s - s) / B.
-- What is farther away than R(T) and all that the link still moves needs no look at all.
+    dS/dt <= Σ_j a_j ρ_j + C,   C = 3 W Σ_j |q̇_j| ρ_j
+
+(of ω_j × (p - o_j): from q̈_j; from turning axes, W |q̇_j| ρ_j; from moving ones, together W Σ |q̇_j| ρ_j; from the
+body's own turning, again W Σ |q̇_j| ρ_j). Within a tick joints do not accelerate. A tick passes if S(u(t + dt)) + C dt
+<= v_s; m ticks at once if S(u(t + m dt)) + (Σ_j a_j ρ_j + C) m dt <= v_s, which implies it of each of them. So what is
+told does not depend on which ticks are looked at; and if a way passes, what is left of it passes a tick later, for any
+p' that p may have moved to: all that has to hold then is among what held before.
 """
 
 from __future__ import annotations
@@ -22,14 +27,14 @@ from math import sqrt
 from typing import Any
 
 from qpsafe.compiled.compiled import Array, inline, linked
-from qpsafe.compiled.memory import view
 from qpsafe.gate.braking_path import at_time, braked, covered, ticks_of
 from qpsafe.gate.tables import APPROACH, DT, NEAR, PERSON
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 
 _forward = linked(forward, kinematics)
-_ROUNDING = 1e-11  # [m]
+_ROUNDING = 1e-9  # [m/s]
+MOST = 16  # ticks that are looked at together, a power of 2
 
 
 @inline
@@ -70,21 +75,31 @@ def measure_all(axes: Array, points: Array, away: Array) -> None:
 
 
 @inline
-def _approach(t: Any, c: int, memory: Array, axis: Array, s: float, p: Array, distance: float, speeds: Array) -> float:
-    """Speed at which the nearest point of an axis comes nearer to p [m/s]."""
+def _field(t: Any, c: int, memory: Array, speeds: Array, axis: Array, s: float, p: Array) -> tuple[float, float, float]:
+    """Of the body's velocity field at p: along n (times the distance), its square, and |ω|."""
     twists, on = cut(memory, speeds.shape[0], 0)[1], t.supports[t.bodies[c]]
-    x = axis[0, 0] + s * (axis[1, 0] - axis[0, 0])
-    y = axis[0, 1] + s * (axis[1, 1] - axis[0, 1])
-    z = axis[0, 2] + s * (axis[1, 2] - axis[0, 2])
-    nx, ny, nz = (p[0] - x) / distance, (p[1] - y) / distance, (p[2] - z) / distance
-    speed = 0.0
+    vx, vy, vz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(speeds.shape[0]):
-        # nᵀ (v + ω × x)
-        along = nx * (twists[0, j] + twists[4, j] * z - twists[5, j] * y)
-        along += ny * (twists[1, j] + twists[5, j] * x - twists[3, j] * z)
-        along += nz * (twists[2, j] + twists[3, j] * y - twists[4, j] * x)
-        speed += on[j] * along * speeds[j]
-    return speed
+        rate = on[j] * speeds[j]
+        vx, vy, vz = vx + rate * twists[0, j], vy + rate * twists[1, j], vz + rate * twists[2, j]
+        wx, wy, wz = wx + rate * twists[3, j], wy + rate * twists[4, j], wz + rate * twists[5, j]
+    bx, by, bz = vx + wy * p[2] - wz * p[1], vy + wz * p[0] - wx * p[2], vz + wx * p[1] - wy * p[0]
+    nx = p[0] - axis[0, 0] - s * (axis[1, 0] - axis[0, 0])
+    ny = p[1] - axis[0, 1] - s * (axis[1, 1] - axis[0, 1])
+    nz = p[2] - axis[0, 2] - s * (axis[1, 2] - axis[0, 2])
+    return nx * bx + ny * by + nz * bz, bx * bx + by * by + bz * bz, sqrt(wx * wx + wy * wy + wz * wz)
+
+
+@inline
+def _largest(along: float, b: float, turning: float, distance: float, u: float) -> float:
+    """S(u): the fastest approach to any p' within u of p."""
+    if not u < distance:
+        return b + turning * u
+    sine = u / distance
+    cosine = sqrt(1.0 - sine * sine)
+    if along >= b * cosine:
+        return b + turning * u
+    return along * cosine + sqrt(max(b * b - along * along, 0.0)) * sine + turning * u
 
 
 @inline
@@ -109,7 +124,7 @@ def _hot(t: Any, v: Array, points: int, age: float, away: Array, hot: Index) -> 
 
 @inline
 def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float, to_the_end: bool) -> float:
-    """By how much a command's way approaches people too fast: sum over ticks and pairs of what is above v_s dt [m].
+    """By how much a command's way approaches people too fast: sum over ticks and pairs of what is above v_s, times dt.
 
     Args:
         t: `Tables`.
@@ -124,7 +139,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float,
     """
     n, p, dt, v_s = q.shape[0], points.shape[0], t.numbers[DT], t.numbers[APPROACH]
     count = _hot(t, v, p, age, w.away, w.hot)
-    excess, tick, stepped = 0.0, 0, 0
+    excess, tick, person = 0.0, 0, t.numbers[PERSON]
     while count > 0:
         time = tick * dt
         at_time(q, v, t.acceleration, dt, time, w.there)
@@ -134,38 +149,43 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float,
             total += abs(w.speeds[j])
         stand(t, w.there, w.none, w.nowhere, w.memory)
         place_axes(t, w.memory, w.axes)
-        radius = t.numbers[NEAR] + t.numbers[PERSON] * (age + time)
-        left, ahead = 0, 1 << 30
+        radius = t.numbers[NEAR] + person * (age + time + dt)  # at the end of the tick
+        left, ahead = 0, MOST
         for h in range(count):
             pair = w.hot[h]
             c, k = pair // p, pair % p
-            distance, s = to_axis(w.axes[c], points[k])
-            inside = not min(distance, w.before[pair]) - t.radii[c] >= radius
-            if stepped == 1 and inside and w.before[pair] - distance > v_s * dt + _ROUNDING:
-                if excess == 0.0:
-                    w.worst[0], w.worst[1] = c, k
-                excess += w.before[pair] - distance - v_s * dt
-                if not to_the_end:
-                    return excess
-            w.before[pair] = distance
-            fastest, growth = 0.0, 0.0
+            fastest = 0.0
             for j in range(n):
-                lever = t.levers[c, j]
-                if lever > 0.0:
-                    fastest += lever * abs(w.speeds[j])
-                    growth += (lever + distance) * (t.acceleration[j] + 3.0 * total * abs(w.speeds[j]))
+                fastest += t.levers[c, j] * abs(w.speeds[j])
             if fastest <= v_s:
                 continue  # so it is for the rest of the way
-            gap = distance - t.radii[c] - radius
-            if gap > 0.0:
-                steps = gap / ((t.numbers[PERSON] + fastest) * dt)
-            elif distance > 0.0:
-                towards = _approach(t, c, w.memory, w.axes[c], s, points[k], distance, w.speeds)
-                steps = (v_s - towards) / (growth * dt)
-            else:
-                steps = 0.0
-            ahead = min(ahead, int(max(min(steps, 1e6), 1.0)))
             w.hot[left] = pair
             left += 1
-        count, tick, stepped = left, tick + ahead, ahead
+            distance, s = to_axis(w.axes[c], points[k])
+            gap = distance - t.radii[c] - radius - fastest * dt
+            if gap >= 0.0:
+                ahead = min(ahead, 1 + int(min(gap / ((person + fastest) * dt), 1e6)))
+                continue
+            along, square, turning = _field(t, c, w.memory, w.speeds, w.axes[c], s, points[k])
+            b, steps = sqrt(square), MOST
+            along = along / distance if distance > 0.0 else b
+            while True:
+                u, growth = person * (time + steps * dt), 0.0
+                for j in range(n):
+                    speed = abs(w.speeds[j])
+                    if t.levers[c, j] > 0.0:
+                        more = t.acceleration[j] if steps > 1 else 0.0
+                        growth += (t.levers[c, j] + distance + u) * (more + 3.0 * total * speed)
+                over = min(_largest(along, b, turning, distance, u), fastest) + growth * steps * dt - v_s
+                if over <= 0.0 or steps == 1:
+                    break
+                steps //= 2
+            if over > _ROUNDING:
+                if excess == 0.0:
+                    w.worst[0], w.worst[1] = c, k
+                excess += over * dt
+                if not to_the_end:
+                    return excess
+            ahead = min(ahead, steps)
+        count, tick = left, tick + ahead
     return excess

@@ -17,7 +17,7 @@ class VerifiedMotion(Fixed):
         R(t) = person_error + person_speed (t + age + latency + servo_lag).
 
     Args:
-        person_speed: v_h, the fastest that anybody comes [m/s]. 1.6 for walking people (ISO 13855), 2.0 where hands reach.
+        person_speed: v_h, the fastest that anybody comes [m/s]: 1.6 for walking people (ISO 13855), 2.0 for hands.
         latency: T_r, from what a sensor sees to the reference that answers it [s]. One tick of sensing, one of the
             network, and what the controller filters; ours.
         servo_lag: How far the robot is behind its references [s]; EGM's is 0.010 to 0.020.
@@ -45,7 +45,7 @@ class VerifiedMotion(Fixed):
                 number = float(value)
             except (TypeError, ValueError):
                 number = math.nan
-            if isinstance(value, bool) or not (0.0 < number if positive else 0.0 <= number) or not number < math.inf:
+            if isinstance(value, bool) or not (number > 0.0 if positive else number >= 0.0) or not number < math.inf:
                 raise ConfigurationError(
                     "VerifiedMotion", key, value, f"a finite number {'> 0' if positive else '>= 0'}"
                 )

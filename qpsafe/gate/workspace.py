@@ -20,7 +20,6 @@ class Work(NamedTuple):
     brake: Any  # what braking commands (n,)
     trial: Any  # a command between that and the given one (n,)
     away: Any  # distances of axes and points (c p,)
-    before: Any  # likewise, at the instant before
     pair: Any  # see `nearest_pair`
     found: Any  # likewise, and which of the group's pairs it was
     nowhere: Any  # (0, 3)
@@ -39,7 +38,7 @@ def lengths(n: int, c: int, s: int, m: int, p: int) -> tuple[int, int]:
         m: Pairs of shapes.
         p: Points, at most.
     """
-    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + 2 * c * p + PAIR + 3 * s + m + 8, c * p + 2
+    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + c * p + PAIR + 3 * s + m + 8, c * p + 2
 
 
 @inline
@@ -48,7 +47,7 @@ def workspace(floats: Any, integers: Any, n: int, c: int, s: int, m: int, p: int
     a = 16 * (n + 1) + 6 * n
     b = a + 6 * c
     d = b + 5 * n
-    e = d + 2 * c * p
+    e = d + c * p
     length = PAIR + 3 * s + m
     return Work(
         view(floats, 0, (a,)),
@@ -59,7 +58,6 @@ def workspace(floats: Any, integers: Any, n: int, c: int, s: int, m: int, p: int
         view(floats, b + 3 * n, (n,)),
         view(floats, b + 4 * n, (n,)),
         view(floats, d, (c * p,)),
-        view(floats, d + c * p, (c * p,)),
         view(floats, e, (length,)),
         view(floats, e + length, (8,)),
         view(floats, 0, (0, 3)),

@@ -126,16 +126,21 @@ def checked_gate(gate: VerifiedMotion | str | None) -> VerifiedMotion | None:
     return gate
 
 
-def checked_evasion(evasion: Evasion, robot: Robot, dt: float) -> Evasion:
+def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float) -> Evasion:
     """`evasion`, if it is one of this robot and this tick.
 
     Args:
-        evasion: As given.
+        evasion: As given; None for that of the robot, "paper" for M = 4, D = 20.
         robot: Whose joints move.
         dt: Tick [s].
     """
+    if evasion is None:
+        return Evasion.for_robot(robot, dt)
+    if isinstance(evasion, str) and evasion == "paper":
+        return Evasion.paper(robot.nq, dt)
     if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
-        raise ConfigurationError("SafetyController", "evasion", evasion, f"an Evasion of {counted(robot.nq, 'joint')}")
+        expected = f'an Evasion of {counted(robot.nq, "joint")}, or "paper"'
+        raise ConfigurationError("SafetyController", "evasion", evasion, expected)
     if evasion.dt != dt:
         raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
     return evasion

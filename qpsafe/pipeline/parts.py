@@ -44,7 +44,7 @@ class Parts:
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
     AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`,
-    `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by `set_tasks`.
+    `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks by `set_tasks`.
     """
 
     _robot: Robot
@@ -122,7 +122,7 @@ class Parts:
         return self._evasion
 
     @evasion.setter
-    def evasion(self, evasion: Evasion) -> None:
+    def evasion(self, evasion: Evasion | str | None) -> None:
         self._evasion = checked_evasion(evasion, self._robot, self._dt)
 
     @property

@@ -16,13 +16,13 @@ from qpsafe.pipeline.resolve import Array, Resolve, Resolved
 from qpsafe.pipeline.sense import Seen, Sense
 
 if TYPE_CHECKING:
+    from qpsafe.danger.evasion import Evasion
     from qpsafe.gate.gate import Gate
     from qpsafe.gate.rules import VerifiedMotion
-    from qpsafe.limits import JointLimits
-    from qpsafe.sensing.hulls import Obstacle
-    from qpsafe.danger.evasion import Evasion
     from qpsafe.laws.problem import Law
+    from qpsafe.limits import JointLimits
     from qpsafe.robot.robot import Robot
+    from qpsafe.sensing.hulls import Obstacle
     from qpsafe.sensing.sensing import DistanceSensing
     from qpsafe.tasks.task import Task
 

@@ -40,7 +40,7 @@ class DangerMonitor:
         dt: Tick [s], the same as given to `solve_ik`.
         field: The danger field; the paper's weights by default.
         activation: Thresholds, the highest priority's first; the robot's two by default.
-        evasion: The admittance (16).
+        evasion: The admittance (16); that of the robot by default, "paper" for M = 4, D = 20.
         limits: Joint limits, by default the robot's; "off" for none.
         ramp: A task that danger released comes back within this time at the earliest, and is released within a tenth
             of it [s]; 0 for at once. Here no path waits for the robot, as in section IV-C.
@@ -69,7 +69,7 @@ class DangerMonitor:
         *,
         field: DangerField | None = None,
         activation: Activation | None = None,
-        evasion: Evasion | None = None,
+        evasion: Evasion | str | None = None,
         limits: JointLimits | str | None = None,
         ramp: float = 0.5,
         base: ArrayLike | None = None,
@@ -81,8 +81,7 @@ class DangerMonitor:
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
         if not isinstance(self.activation, Activation):
             raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
-        own = Evasion.default(robot.nq, self.dt) if evasion is None else evasion
-        self.evasion = checked_evasion(own, robot, self.dt)
+        self.evasion = checked_evasion(evasion, robot, self.dt)
         self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
         self.ramp = float(ramp)
         self._base = None if base is None else checked_pose("DangerMonitor", "base", base)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from qpsafe.recovery import steps
 from qpsafe.recovery.events import Cursor
 from qpsafe.recovery.returns import RecoveryRules, Return
-from qpsafe.recovery.steps import FINITE, HOLD, MET, PHASES, SET_OUT
+from qpsafe.recovery.steps import FINITE, HOLD, MET, PHASES, SET_OUT, quiet_after
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.trajectory import FixedJoints
 
@@ -83,6 +83,7 @@ class Recovery:
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
         self.waits_for: tuple[str, ...] = ()
         self._rate = 1.0  # of the clock
+        self._quiet = 0.0  # for how long danger has been small [s]
         self._changed = self._led = False
         self._way: Recovery | None = None
         self._cursors: list[Cursor] = []
@@ -141,14 +142,14 @@ class Recovery:
     def clocks(self) -> tuple:
         """Phase, times on the path and on the returns; set them back when the robot could not go along."""
         way = None if self._way is None else self._way.clocks
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self._code, way
+        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self._code, way, self._quiet
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
         self.path_time, self._rate = clocks[:2]
         self._returns, self._pending = list(clocks[2]), list(clocks[3])
         self._enter(clocks[4])
-        self._due = None
+        self._due, self._quiet = None, clocks[6]
         if self._way is not None and clocks[5] is not None:
             self._way.clocks = clocks[5]
 
@@ -169,7 +170,9 @@ class Recovery:
         self.waits_for = ()
         before, of = self._code, (self, state, activations)
         danger = not cdf_n <= self.suspend_above and self._rules.enabled
-        phase, anew = _next_phase(before, self._changed, danger, self.path_time, of)
+        self._quiet = quiet_after(self._quiet, cdf_n, self._rules.calm * self.suspend_above, self._dt)
+        waits = self._quiet <= self._rules.dwell
+        phase, anew = _next_phase(before, self._changed, danger, waits, self.path_time, of)
         self._changed = False
         if phase != before:
             self._enter(phase)
@@ -185,6 +188,8 @@ class Recovery:
             samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
             # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
             return tuple([sample.slowed(0.0) for sample in samples] if self.waits_for else samples)
+        if self.phase == SUSPENDED and before == phase and (self._rules.held or not danger):
+            return tuple([self._reference(k, state, 0.0) for k in range(len(self.tasks))])
         if self.phase == SUSPENDED:
             held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
             self._last = [(state, sample) for sample in held]  # only the last tick's will be of interest

@@ -30,6 +30,9 @@ class RecoveryRules:
         ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
         patience: Time [s] after which a robot that stands off its goals, or moves without getting nearer, though no
             danger and no motion of the goals explains it, says so, and is led back through its joints or held.
+        calm, dwell: The way back begins when danger has been at or below this share of Δ(1-ε) for this time [s]. Until
+            then, where danger is not above Δ(1-ε), the tasks are held where they are.
+        held: Whether they are held above it, too. In the paper what is left of their activation pulls them to x_d,s.
         enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
 
     Raises:
@@ -45,15 +48,28 @@ class RecoveryRules:
     tolerance: float = 5e-4
     ramp: float = 0.2
     patience: float = 2.0
+    calm: float = 0.8
+    dwell: float = 0.3
+    held: bool = True
     enabled: bool = True
 
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name != "enabled" and not (isinstance(value, int | float) and 0.0 < value < math.inf):
+            if item.name in ("enabled", "held"):
+                continue
+            if item.name == "dwell" and value == 0.0:
+                continue
+            if not (isinstance(value, int | float) and 0.0 < value < math.inf):
                 raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
-        if self.acceleration > 1.0:
-            raise ConfigurationError("RecoveryRules", "acceleration", self.acceleration, "a share in (0, 1]")
+        for key in ("acceleration", "calm"):
+            if getattr(self, key) > 1.0:
+                raise ConfigurationError("RecoveryRules", key, getattr(self, key), "a share in (0, 1]")
+
+    @classmethod
+    def paper(cls) -> RecoveryRules:
+        """The way back begins as soon as danger falls below Δ(1-ε), section IV-C, at the pace of the first release."""
+        return cls(speed=0.25, angular_speed=0.8, joint_speed=0.8, calm=1.0, dwell=0.0, held=False)
 
     def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
         """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""

@@ -27,19 +27,22 @@ HOLD, SET_OUT, GO_ON = range(3)
 def phases_by(ask: Ask) -> tuple[Callable[..., tuple[int, bool]], Callable[..., tuple[float, float, bool]]]:
     """The steps of the state machine and of its clock, for whoever answers their questions."""
 
-    def next_phase(phase: int, changed: bool, danger: bool, time: float, of: Any) -> tuple[int, bool]:
+    def next_phase(phase: int, changed: bool, danger: bool, waits: bool, time: float, of: Any) -> tuple[int, bool]:
         """Phase of this tick, and whether all tasks have to come back from where they are then.
 
         Args:
             phase: Of the last tick.
             changed: Whether the tasks are others since.
             danger: Whether there is too much of it to go on.
+            waits: Whether it has not been small for long enough to come back.
             time: On the path [s].
             of: Handed on to who answers.
         """
         left = changed and phase == FOLLOWING and not ask(MET, of, time)
         if danger:
             return SUSPENDED, True
+        if waits and phase == SUSPENDED:
+            return SUSPENDED, left
         if left or phase == SUSPENDED:
             return (RECOVERING if ask(FINITE, of, time) else SUSPENDED), left
         if phase == RECOVERING and not ask(BACK, of, time):
@@ -66,6 +69,18 @@ def phases_by(ask: Ask) -> tuple[Callable[..., tuple[int, bool]], Callable[..., 
         return (time if waits else ahead), rate, waits
 
     return next_phase, advance
+
+
+def quiet_after(quiet: float, cdf_n: float, calm: float, dt: float) -> float:
+    """How long danger has been small [s].
+
+    Args:
+        quiet: Up to the last tick [s].
+        cdf_n: Danger now.
+        calm: Up to which it is small.
+        dt: Tick [s].
+    """
+    return quiet + dt if cdf_n <= calm else 0.0  # false for NaN
 
 
 def ways_by(too_fast: Callable[[Any], bool]) -> Callable[[bool, bool, Any], int]:

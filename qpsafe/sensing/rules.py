@@ -30,7 +30,7 @@ class SensingRules:
         dead_after: A spot without a usable reading for this long is dead until acknowledged [s].
         dead_share: With more than this share of the spots unusable the robot stops.
         speed_cap: Largest speed of any point of the wire while a spot is dead, the reduced speed of ISO 10218 [m/s].
-        velocities: Whether approaching obstacles are estimated and fed to the kinetic field (the paper has none).
+        velocities: Whether approaching obstacles are estimated and fed to the kinetic field; the paper takes them as standing still.
 
     Raises:
         ConfigurationError: A value is not finite or out of range.
@@ -49,7 +49,7 @@ class SensingRules:
     dead_after: float = 0.02
     dead_share: float = 0.2
     speed_cap: float = 0.25
-    velocities: bool = False
+    velocities: bool = True
 
     def __post_init__(self) -> None:
         for key in ("d_min", "tolerance", "approach_speed", "jump", "stuck_motion"):

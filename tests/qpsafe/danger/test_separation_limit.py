@@ -52,7 +52,7 @@ def controller_with(robot, law=None, figures=None, **parts):
 def test_rows_are_the_rates_at_which_distances_shrink(name, seed):
     robot, rng = ROBOTS[name], np.random.default_rng(seed)
     q, qd = some_state(robot, rng)
-    points = rng.uniform(-1.0, 1.0, (3, 3)) + [0.2, 0.0, 0.5]
+    points = rng.uniform(-1.0, 1.0, (3, 3)) + np.array([0.2, 0.0, 0.5])
     for parts in (PARTS[name], LinkParts.wire(robot)):
         here, rows = parts.approaches(robot.at(q), points)
         h = 1e-6
@@ -82,7 +82,7 @@ def test_the_speed_is_the_exact_inverse_also_where_it_is_held_for_a_tick(a_s, v_
 def test_rows_that_are_left_out_can_be_reached_by_no_command_of_the_tick(seed, age):
     rng = np.random.default_rng(seed)
     q, qd = some_state(ROBOT, rng)
-    points = rng.uniform(-0.8, 0.8, (4, 3)) + [0.3, 0.0, 0.4]
+    points = rng.uniform(-0.8, 0.8, (4, 3)) + np.array([0.3, 0.0, 0.4])
     limit, limits = SeparationLimit(Separation(rng.uniform(0.5, 8.0))), JointLimits.of(ROBOT, DT)
     few = limit.level(ROBOT.at(q), PARTS["irb140"], points, age, qd=qd, limits=limits)
     kept = np.zeros((0, 2)) if few is None else np.column_stack((few.points, few.gaps))
@@ -189,7 +189,7 @@ def test_moving_away_is_always_allowed():
 
 
 def test_old_sight_is_no_room():
-    """A reading of an age is as good as a person that has come nearer meanwhile; what is stale is the sensor's matter."""
+    """Somebody seen a while ago may have come nearer since; what is stale is the sensor's matter."""
     limit, point = SeparationLimit(Separation(2.0)), ROBOT.pose("tcp", ROBOT.home)[None, :3, 3] + [0.4, 0.0, 0.0]
     fresh, aged = (limit.level(ROBOT.at(ROBOT.home), PARTS["irb140"], point, age) for age in (0.0, 0.03))
     assert (aged.upper <= fresh.upper).all()
