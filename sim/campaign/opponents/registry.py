@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
@@ -24,6 +25,7 @@ from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.campaign.opponents.scaling import PathScaling
+from qpsafe.sim.campaign.opponents.separated import Separated
 from qpsafe.sim.campaign.opponents.stop import StopOnly
 
 if TYPE_CHECKING:
@@ -78,6 +80,10 @@ def _capped(station: Station) -> SafetyController:
     return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **_PAPER)
 
 
+def _apart(station: Station) -> SafetyController:
+    return station.controller(HierarchicalLaw(), separation=SeparationLimit(station.separation), **_PAPER)
+
+
 #: What the paper has: evasion tuned by hand, obstacles that stand still, a return as soon as danger falls.
 _PAPER: dict[str, Any] = {
     "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(),
@@ -93,6 +99,8 @@ _BUNDLED = (
     Opponent("barrier", "strict, with a cap on the danger field", _capped),
     Opponent("velocities", "strict, with approach velocities in the field",
              _with(HierarchicalLaw(), **_PAPER | {"sensing": SensingRules(velocities=True)})),
+    Opponent("separation", "rows for v_max under the joint limits, no evasion, the path waits", Separated),
+    Opponent("strict_separation", "strict, with rows for v_max above all tasks", _apart),
     Opponent("default", "SafetyController as it comes", _with()),
 )  # fmt: skip
 _known: dict[str, Opponent] = {entry.name: entry for entry in _BUNDLED}
