@@ -48,6 +48,8 @@ _PUBLIC = {
     "SafetyController": "qpsafe.controller",
     "Sample": "qpsafe.tasks.trajectory",
     "SensingRules": "qpsafe.sensing.rules",
+    "Separation": "qpsafe.danger.separation",
+    "SeparationLimit": "qpsafe.danger.separation_limit",
     "SpotArray": "qpsafe.sensing.spots",
     "StopCategory": "qpsafe.irc5.supervisor",
     "Supervisor": "qpsafe.irc5.supervisor",
@@ -77,6 +79,8 @@ if TYPE_CHECKING:
     from qpsafe.danger.activation import Threshold as Threshold
     from qpsafe.danger.evasion import Evasion as Evasion
     from qpsafe.danger.field import DangerField as DangerField
+    from qpsafe.danger.separation import Separation as Separation
+    from qpsafe.danger.separation_limit import SeparationLimit as SeparationLimit
     from qpsafe.danger.thresholds import robot_activation as robot_activation
     from qpsafe.errors import ConfigurationError as ConfigurationError
     from qpsafe.errors import QpsafeError as QpsafeError

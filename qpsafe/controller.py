@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
+from qpsafe.danger.separation_limit import SeparationLimit, oldest
 from qpsafe.errors import in_words
 from qpsafe.gate.gated import NO_AGES, PASSED
 from qpsafe.gate.rules import VerifiedMotion
@@ -31,12 +32,12 @@ from qpsafe.pipeline.checks import (
     checked_robot,
     checked_spots,
 )
-from qpsafe.pipeline.parts import Parts
 from qpsafe.pipeline.resolve import Resolved, judged
+from qpsafe.pipeline.running import Running
 from qpsafe.pipeline.stages import Stages
-from qpsafe.recovery.recovery import RECOVERING, Recovery, RecoveryRules
+from qpsafe.recovery.recovery import RECOVERING, RecoveryRules
 from qpsafe.recovery.returns import GentleLimits
-from qpsafe.recovery.stall import CALM, StallWatch
+from qpsafe.recovery.stall import CALM
 from qpsafe.reference import JointReference
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
@@ -55,7 +56,7 @@ if TYPE_CHECKING:
 _WAY_LAW = HierarchicalLaw()
 
 
-class SafetyController(Parts):
+class SafetyController(Running):
     """Danger in, joint references out.
 
     Args:
@@ -76,6 +77,7 @@ class SafetyController(Parts):
             "off" sends it as it is. Without limits it is off.
         clearance: How near the robot may come to known obstacles, to itself and to what it carries; "off" switches it
             off, and so does `limits="off"`.
+        separation: Speed and separation monitoring, above all tasks; none by default.
         recovery: How the robot returns to its path after danger.
 
     Raises:
@@ -101,6 +103,7 @@ class SafetyController(Parts):
         clearance: ClearanceLimit | str | None = None,
         recovery: RecoveryRules | None = None,
         gate: VerifiedMotion | str | None = None,
+        separation: SeparationLimit | None = None,
     ) -> None:
         self._robot = checked_robot("SafetyController", robot)
         self._dt = checked_dt("SafetyController", dt)
@@ -118,7 +121,7 @@ class SafetyController(Parts):
         if self._spots is not None:
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
         self._units = UnitWatch(self._spots, self._dt)
-        self.barrier, self.gate = barrier, gate
+        self.barrier, self.gate, self.separation = barrier, gate, separation
         self._known, self._carried = tuple(known), carried
         self.clearance = "off" if self._limits is None and clearance is None else clearance
         self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
@@ -128,29 +131,6 @@ class SafetyController(Parts):
         self._stages.resolve(self._tasks, self._law)
         _ = self.verifies  # what it measures by is made here
         self.reset()
-
-    def reset(self) -> None:
-        """Start anew: the next valid measurement sets the commanded configuration."""
-        self._recovery = Recovery(self._tasks, self._activation.suspend_above, self._dt, self._recovery_rules)
-        self._evasion.reset()
-        if self._sensing is not None:
-            self._sensing.reset()
-        self._units.reset()
-        rules = self._recovery_rules
-        self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)
-        self._seq, self._active = -1, False
-        self._q = self._robot.home
-        self._qd = self._qd_before = np.zeros(self._robot.nq)
-
-    def reseed(self) -> None:
-        """Something else has moved or stopped the robot: the next valid measurement sets the commanded configuration.
-
-        The path's clock stays, and the robot is led back to its path as after a suspension.
-        """
-        self._evasion.reset()
-        self._recovery.set_tasks(self._tasks, self._activation.suspend_above, restart=False)
-        self._active = False
-        self._qd = self._qd_before = np.zeros(self._robot.nq)
 
     def step(
         self,
@@ -208,7 +188,7 @@ class SafetyController(Parts):
             self._q, self._active = np.array(here), True
             self._q.flags.writeable = False
             self._qd = self._qd_before = np.zeros(self._robot.nq)
-        barrier, recovery = self._barrier, self._recovery
+        barrier, separation, recovery = self._barrier, self._separation, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
         seen = self._stages.sense(self._sensing, self._field, self._evasion)(q, qd, distances, points, ages)
@@ -219,7 +199,8 @@ class SafetyController(Parts):
         commanded = RobotState(self._robot, self._q)
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
-            explained = seen.capped or not min(activations) >= 1.0 or (barrier is not None and len(seen.points) > 0)
+            capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
+            explained = seen.capped or not min(activations) >= 1.0 or capped
             still = float(np.abs(qd0).max()) < CALM
             stall.watch(self._seq, self._tasks, self._law, recovery, commanded, self._qd, explained, still)
         samples = recovery.update(cdf_n, commanded, activations)
@@ -233,10 +214,13 @@ class SafetyController(Parts):
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
         given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
-        if barrier is None:
+        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+        if barrier is None and separation is None:
             resolved = resolve(*given)
         else:
-            resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
+            caps, age = (separation, barrier), oldest(old, self._rules.max_age)
+            here = as_joint_position(q, self._robot)
+            resolved = self._stages.resolve_under(caps, here, seen, age, resolve, given)
         command = resolved.command
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
@@ -246,7 +230,7 @@ class SafetyController(Parts):
             command = slower(self._braking, self._qd)
         gated, gate = PASSED, self.verifies
         if gate is not None:
-            command, old = command.copy(), NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+            command = command.copy()
             gated = gate(self._q, self._qd, command, seen.points, old)
         messages = (*stall.messages, *messages, *seen.notes, *self._units.notes(distances, points))
         return Tick(

@@ -83,6 +83,7 @@ def why_not(controller: SafetyController) -> str:
         "the limits are of another making": limits != "off" and type(limits) is not JointLimits,
         "the limits have a largest jerk": type(limits) is JointLimits and limits.max_jerk is not None,
         "there is a barrier": controller.barrier is not None,
+        "there is a separation limit": controller.separation is not None,
         "the activation is of another making": type(activation) is not Activation
         or any(type(threshold) is not Threshold for threshold in activation.thresholds),
         "the recovery rules are of another making": type(rules) is not RecoveryRules,

@@ -64,9 +64,15 @@ class Separation:
         v, a_s, T_r = np.maximum(np.asarray(speed, dtype=float), 0.0), self.deceleration, self.reaction_time
         return self.standing + self.person_speed * v / a_s + v * T_r + v * v / (2.0 * a_s)
 
-    def speed(self, distance: ArrayLike) -> NDArray[np.float64]:
-        """v_max for distances, any shape [m]; +inf where the distance is, 0 where it is not a number [m/s]."""
-        b = self.deceleration * self.reaction_time + self.person_speed
+    def speed(self, distance: ArrayLike, held: float = 0.0) -> NDArray[np.float64]:
+        """v_max for distances, any shape [m]; +inf where the distance is, 0 where it is not a number [m/s].
+
+        Args:
+            distance: To a person, any shape [m].
+            held: For how long the speed is kept before another one can be commanded [s]: S_p(v_max) + v_max held = d,
+                so that it is admissible still where it leads to.
+        """
+        b = self.deceleration * (self.reaction_time + held) + self.person_speed
         room = np.asarray(distance, dtype=float) - self.standing
         room = np.where(room > 0.0, room, 0.0)  # false for NaN
         return np.maximum(np.sqrt(b * b + 2.0 * self.deceleration * room) - b, 0.0)  # b² may underflow

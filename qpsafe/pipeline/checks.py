@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from qpsafe.compiled.compiled import Array, entry, readable
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.gate.rules import VerifiedMotion
@@ -156,6 +157,14 @@ def checked_barrier(barrier: DangerBarrier | None, field: Any) -> DangerBarrier 
             "SafetyController", "barrier.field", barrier.field, f"the controller's own field, {field}"
         )
     return barrier
+
+
+def checked_separation(separation: SeparationLimit | None) -> SeparationLimit | None:
+    """`separation`, if it is a limit."""
+    if not (separation is None or isinstance(separation, SeparationLimit)):
+        expected = "a SeparationLimit, e.g. SeparationLimit(Separation(deceleration=2.0))"
+        raise ConfigurationError("SafetyController", "separation", separation, expected)
+    return separation
 
 
 def checked_recovery(rules: RecoveryRules) -> RecoveryRules:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.gate.pack import surroundings
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.geometry.clearance import ClearanceLimit, checked_clearance
@@ -28,6 +29,7 @@ from qpsafe.pipeline.checks import (
     checked_field,
     checked_gate,
     checked_law,
+    checked_separation,
 )
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
 from qpsafe.sensing.hulls import Obstacle
@@ -50,9 +52,8 @@ class Parts:
     """The parts of a `SafetyController`.
 
     Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`,
-    `clearance`, `gate`; what does not fit is a ConfigurationError, and nothing has changed. Tasks are exchanged by
-    `set_tasks`.
+    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`,
+    `clearance`, `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks by `set_tasks`.
     """
 
     _robot: Robot
@@ -70,6 +71,7 @@ class Parts:
     _sensing: DistanceSensing | None
     _barrier: DangerBarrier | None
     _gate: VerifiedMotion | None
+    _separation: SeparationLimit | None
     _stages: Stages
     _clearance: ClearanceLimit | None
     _known: Sequence[Obstacle]
@@ -200,6 +202,15 @@ class Parts:
         self._clearance = checked_clearance(
             clearance, self._robot, lambda: surroundings(self._robot, self._known, self._carried)[0]
         )
+
+    @property
+    def separation(self) -> SeparationLimit | None:
+        """Speed and separation monitoring: how fast any link may approach what is seen."""
+        return self._separation
+
+    @separation.setter
+    def separation(self, separation: SeparationLimit | None) -> None:
+        self._separation = checked_separation(separation)
 
     @property
     def recovery_rules(self) -> RecoveryRules:

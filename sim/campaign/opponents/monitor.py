@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.separation import Separation
 from qpsafe.sensing.detection import BadInput
+from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.engine.bodies import Bodies
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class Monitor:
         self.separation = station.separation if separation is None else separation
         self.robot = station.robot
         self._bodies = Bodies(station.world, station.robot)
-        self._sensing = station.controller().sensing
+        self._sensing = station.controller(**AS_IN_PAPER).sensing
         #: Points seen at the last tick (p, 3) [m].
         self.seen = np.empty((0, 3))
 

@@ -15,15 +15,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.weighted import WeightedLaw
-from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.campaign.opponents.scaling import PathScaling
+from qpsafe.sim.campaign.opponents.separated import Separated
 from qpsafe.sim.campaign.opponents.stop import StopOnly
 
 if TYPE_CHECKING:
@@ -75,26 +77,28 @@ def _with(law: Any = None, **parts: Any) -> Callable[[Station], SafetyController
 
 def _capped(station: Station) -> SafetyController:
     high = robot_thresholds(station.robot)[0]  # the cap of docs/barrier.md, 9.5 on the IRB 140
-    return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **_PAPER)
+    return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **AS_IN_PAPER)
 
 
-#: What the paper has: evasion tuned by hand, obstacles that stand still, a return as soon as danger falls, no gate.
-_PAPER: dict[str, Any] = {
-    "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(), "gate": "off",
-}  # fmt: skip
+def _apart(station: Station) -> SafetyController:
+    return station.controller(HierarchicalLaw(), separation=SeparationLimit(station.separation), **AS_IN_PAPER)
+
+
 _BUNDLED = (
-    Opponent("none", "follows its path whatever happens", _with(**_PAPER), NOTHING),
+    Opponent("none", "follows its path whatever happens", _with(**AS_IN_PAPER), NOTHING),
     Opponent("stop", "stops while somebody is nearer than S_p, speed and separation monitoring", StopOnly),
     Opponent("scaling", "slows down along its path so that nobody is approached faster than v_max", PathScaling),
     Opponent("nullspace", "the paper's law (22) by null-space projections, limits by clipping",
-             _with(NullspaceLaw(), **_PAPER)),
-    Opponent("weighted", "one weighted QP, soft priorities", _with(WeightedLaw(), **_PAPER)),
-    Opponent("paper", "the paper's law as hierarchical QPs", _with(HierarchicalLaw(projection="paper"), **_PAPER)),
-    Opponent("strict", "lexicographic QPs, everything else as in the paper", _with(HierarchicalLaw(), **_PAPER)),
+             _with(NullspaceLaw(), **AS_IN_PAPER)),
+    Opponent("weighted", "one weighted QP, soft priorities", _with(WeightedLaw(), **AS_IN_PAPER)),
+    Opponent("paper", "the paper's law as hierarchical QPs", _with(HierarchicalLaw(projection="paper"), **AS_IN_PAPER)),
+    Opponent("strict", "lexicographic QPs, everything else as in the paper", _with(HierarchicalLaw(), **AS_IN_PAPER)),
     Opponent("barrier", "strict, with a cap on the danger field", _capped),
     Opponent("velocities", "strict, with approach velocities in the field",
-             _with(HierarchicalLaw(), **_PAPER | {"sensing": SensingRules(velocities=True)})),
-    Opponent("unverified", "default without the gate", _with(gate="off")),
+             _with(HierarchicalLaw(), **AS_IN_PAPER | {"sensing": SensingRules(velocities=True)})),
+    Opponent("unverified", "default without gate and rows for furniture", _with(gate="off", clearance="off")),
+    Opponent("separation", "rows for v_max under the joint limits, no evasion, the path waits", Separated),
+    Opponent("strict_separation", "strict, with rows for v_max above all tasks", _apart),
     Opponent("default", "SafetyController as it comes", _with()),
 )  # fmt: skip
 _known: dict[str, Opponent] = {entry.name: entry for entry in _BUNDLED}

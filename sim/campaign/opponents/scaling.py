@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.separation import Separation
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
+from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class PathScaling:
 
     def __init__(self, station: Station, separation: Separation | None = None) -> None:
         self._clock = Clocked(station.reference)
-        self._controller = station.controller(trajectory=self._clock)
+        self._controller = station.controller(trajectory=self._clock, **AS_IN_PAPER)
         self._monitor = Monitor(station, separation)
         self._robot, self._dt = station.robot, self._controller.dt
         self._speed = max(station.speed, 0.05)

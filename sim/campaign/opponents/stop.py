@@ -16,6 +16,7 @@ from qpsafe.danger.separation import Separation
 from qpsafe.pipeline.braking import slower
 from qpsafe.recovery.recovery import SUSPENDED
 from qpsafe.reference import JointReference
+from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class StopOnly:
     """
 
     def __init__(self, station: Station, separation: Separation | None = None, hysteresis: float = 0.05) -> None:
-        self._controller = station.controller()
+        self._controller = station.controller(**AS_IN_PAPER)
         self._monitor = Monitor(station, separation)
         self._again = float(self._monitor.separation.distance(station.speed)) + hysteresis
         self._robot, self._dt = station.robot, self._controller.dt

@@ -58,6 +58,25 @@ def test_scaling_with_perfect_sight_nears_nobody_faster_than_allowed() -> None:
     assert np.mean(np.array(over) > 0.02) < 0.05
 
 
+def test_rows_of_separation_let_nobody_be_approached_faster_than_allowed() -> None:
+    """Told of every part of somebody who walks at 1.6 m/s, until they touch; of one point a link, nearly so."""
+    place, speed = station("irb140", "line"), 1.6
+    bodies, limit = Bodies(place.world, place.robot), place.separation
+    most = {}
+    for name in ("none", "separation_perfect_sight", "strict_separation_perfect_sight"):
+        run, over = played(name, "line", speed), []
+        for k in range(0, TICKS, 4):
+            near = bodies.to_people(place.robot.at(run.q[k]), tracks(speed).row(k), 2.0)
+            if near.distance.min(initial=1.0) <= 0.0:
+                break
+            over.append(float((near.rows @ run.qd[k] - limit.speed(near.distance)).max(initial=0.0)))
+        most[name] = max(over)
+        assert run.path_time[-1] > 0.5
+    assert most["none"] > 0.1
+    assert most["separation_perfect_sight"] < 0.01
+    assert most["strict_separation_perfect_sight"] < 0.05
+
+
 @pytest.mark.parametrize("name", [*names(), "stop_perfect_sight", "default_perfect_sight"])
 def test_all_keep_the_limits_and_never_refuse_to_move(name: str) -> None:
     robot = station("irb140", "line").robot

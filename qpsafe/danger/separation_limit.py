@@ -1,0 +1,146 @@
+"""Speed and separation monitoring as rows of a level: no link approaches what is seen faster than v_max.
+
+For part i of a link, a capsule, and the seen point p_k,
+
+    d = |p_k - a| - r,    n = (p_k - a)/|p_k - a|,    nᵀ J_i(a) q̇ <= v_max(d)        (math section 6)
+
+as `qpsafe.danger.link_parts` measures them. v_max >= 0: standing and moving away are always allowed, so every robot
+that stands can meet the rows; they are a soft level, since one that is too fast already cannot. The speed counts that
+is kept for a whole tick: S_p(v) + v dt <= d. So it is admissible still at the end of the tick, and what the next tick
+asks for is reached by braking less than a_s: S_p(v) - S_p(v') = v' dt, and S_p' >= (v_h + v)/a_s.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.danger.link_parts import LinkParts
+from qpsafe.danger.separation import Separation
+from qpsafe.errors import ConfigurationError
+from qpsafe.fixed import Fixed
+from qpsafe.hqp.level import Level
+from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.text.words import call
+
+if TYPE_CHECKING:
+    from qpsafe.limits import Box, JointLimits
+    from qpsafe.robot.state import RobotState
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class SeparationLevel(Level):
+    """The rows of one tick, an inequality level.
+
+    Attributes:
+        names: Of the links' parts, one a row.
+        points: Number of the seen point of each row (rows,).
+        gaps: Its distance to that part (rows,) [m].
+    """
+
+    __slots__ = ("gaps", "names", "points")
+
+    def __init__(self, A: Array, upper: Array, names: tuple[str, ...], points: Index, gaps: Array) -> None:
+        super().__init__(A, -np.inf, upper)
+        self.names, self.points, self.gaps = names, points, gaps
+
+    def binding(self, qd: Array) -> tuple[tuple[str, int, float], ...]:
+        """Rows that bind at q̇ (n,) [rad/s]: the part, the point's number, their distance [m]."""
+        found = np.flatnonzero(~(self.A @ qd < self.upper - 1e-9)).tolist()
+        return tuple((self.names[k], int(self.points[k]), float(self.gaps[k])) for k in found)
+
+
+class SeparationLimit(Fixed):
+    """Limits how fast any link approaches anything that is seen.
+
+    Args:
+        separation: The figures. Their deceleration is that of the robot, the smallest that was measured.
+
+    Raises:
+        ConfigurationError: No figures.
+    """
+
+    fixed = frozenset(("separation",))
+
+    def __init__(self, separation: Separation) -> None:
+        if not isinstance(separation, Separation):
+            expected = "a Separation, e.g. Separation(deceleration=2.0)"
+            raise ConfigurationError("SeparationLimit", "separation", separation, expected)
+        self.separation = separation
+        import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
+
+    def __repr__(self) -> str:
+        return call(self, self.separation)
+
+    def level(
+        self,
+        state: RobotState,
+        parts: LinkParts,
+        points: Array,
+        age: float = 0.0,
+        *,
+        qd: Array | None = None,
+        limits: JointLimits | None = None,
+    ) -> SeparationLevel | None:
+        """The rows of one tick; None where none can bind.
+
+        Args:
+            state: The robot at its measured position.
+            parts: Capsules around its links.
+            points: What is seen (p, 3) [m].
+            age: How old that is [s]: the person may be nearer by v_h age.
+            qd: Last commanded velocity (n,) [rad/s]; with `limits`, rows that no command of the tick can reach are left
+                out. They would change nothing.
+            limits: Joint limits of the tick.
+        """
+        count = len(parts.radii)
+        if not len(points) or not count:
+            return None
+        distances, A = parts.approaches(state, points)  # (c p,), (c p, n)
+        figures, held = self.separation, 0.0 if limits is None else limits.dt
+        upper = figures.speed(distances - figures.person_speed * age, held)
+        kept = np.isfinite(upper)
+        if limits is not None and qd is not None:
+            # the largest nᵀJ q̇ of any q̇ within a dt of the last one
+            kept &= A @ qd + np.abs(A) @ (limits.max_acceleration * limits.dt) > upper
+        rows = np.flatnonzero(kept)
+        if not len(rows):
+            return None
+        names = tuple([parts.names[k // len(points)] for k in rows.tolist()])
+        return SeparationLevel(A[rows], upper[rows], names, rows % len(points), distances[rows])
+
+
+def kept_apart(level: SeparationLevel, command: Array, box: Box | None) -> Array:
+    """The velocity nearest to a command that meets the rows, as well as they can be met in the box.
+
+    What a law made under them as a soft level stays as it is; laws that take no notice of such levels need it.
+
+    Args:
+        level: The rows.
+        command: Joint velocity (n,) [rad/s], inside the box.
+        box: Admissible velocities, if there are limits.
+    """
+    if (level.A @ command <= level.upper + _MET).all():
+        return command
+    bounds = (None, None) if box is None else (box.lower, box.upper)
+    nearest = solve_hierarchy([level, (np.eye(len(command)), command)], *bounds).qd
+    if not np.isfinite(nearest).all():
+        return command
+    return nearest if box is None else box.clip(nearest)
+
+
+def oldest(ages: Array, max_age: float) -> float:
+    """The largest age of a reading that counts [s]: those that are older are not readings any more.
+
+    Args:
+        ages: Of all spots (k,) [s].
+        max_age: Beyond which they are stale [s].
+    """
+    return float(ages[(ages > 0.0) & (ages <= max_age)].max(initial=0.0))  # false for NaN
+
+
+_MET = 1e-9  # [m/s]
