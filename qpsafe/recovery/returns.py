@@ -39,8 +39,8 @@ class RecoveryRules:
         ConfigurationError: A value is not a finite number > 0, or `acceleration` is more than 1.
     """
 
-    speed: float = 0.25
-    angular_speed: float = 0.8
+    speed: float = 0.5
+    angular_speed: float = 1.6
     joint_speed: float = 0.8
     shortest: float = 0.4
     fade: float = 0.1
@@ -69,7 +69,7 @@ class RecoveryRules:
     @classmethod
     def paper(cls) -> RecoveryRules:
         """The way back begins as soon as danger falls below Δ(1-ε), section IV-C, at the pace of the first release."""
-        return cls(speed=0.25, angular_speed=0.8, joint_speed=0.8, calm=1.0, dwell=0.0, held=False)
+        return cls(speed=0.25, angular_speed=0.8, calm=1.0, dwell=0.0, held=False)
 
     def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
         """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""

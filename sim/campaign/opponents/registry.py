@@ -66,6 +66,11 @@ class Opponent(NamedTuple):
     sight: str = SPOTS
 
 
+#: Everything else as in the paper: evasion tuned by hand, obstacles at rest, a return as soon as danger falls.
+_REST: dict[str, Any] = {"sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper()}
+_REST |= {"evasion": "paper"}
+
+
 def _with(law: Any = None, **parts: Any) -> Callable[[Station], SafetyController]:
     def make(station: Station) -> SafetyController:
         return station.controller(law, **parts)
@@ -75,24 +80,21 @@ def _with(law: Any = None, **parts: Any) -> Callable[[Station], SafetyController
 
 def _capped(station: Station) -> SafetyController:
     high = robot_thresholds(station.robot)[0]  # the cap of docs/barrier.md, 9.5 on the IRB 140
-    return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **_PAPER)
+    return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **_REST)
 
 
-#: What the paper has: evasion tuned by hand, obstacles that stand still, a return as soon as danger falls.
-_PAPER: dict[str, Any] = {
-    "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(),
-}  # fmt: skip
 _BUNDLED = (
     Opponent("none", "follows its path whatever happens", _with(), NOTHING),
     Opponent("stop", "stops while somebody is nearer than S_p, speed and separation monitoring", StopOnly),
     Opponent("scaling", "slows down along its path so that nobody is approached faster than v_max", PathScaling),
-    Opponent("nullspace", "the paper's law (22) by null-space projections, limits by clipping", _with(NullspaceLaw(), **_PAPER)),
-    Opponent("weighted", "one weighted QP, soft priorities", _with(WeightedLaw(), **_PAPER)),
-    Opponent("paper", "the paper's law as hierarchical QPs", _with(HierarchicalLaw(projection="paper"), **_PAPER)),
-    Opponent("strict", "lexicographic QPs, everything else as in the paper", _with(HierarchicalLaw(), **_PAPER)),
+    Opponent("nullspace", "the paper's law (22) by null-space projections, limits by clipping",
+             _with(NullspaceLaw(), **_REST)),
+    Opponent("weighted", "one weighted QP, soft priorities", _with(WeightedLaw(), **_REST)),
+    Opponent("paper", "the paper's law as hierarchical QPs", _with(HierarchicalLaw(projection="paper"), **_REST)),
+    Opponent("strict", "lexicographic QPs, everything else as in the paper", _with(HierarchicalLaw(), **_REST)),
     Opponent("barrier", "strict, with a cap on the danger field", _capped),
     Opponent("velocities", "strict, with approach velocities in the field",
-             _with(HierarchicalLaw(), **_PAPER | {"sensing": SensingRules(velocities=True)})),
+             _with(HierarchicalLaw(), **_REST | {"sensing": SensingRules(velocities=True)})),
     Opponent("default", "SafetyController as it comes", _with()),
 )  # fmt: skip
 _known: dict[str, Opponent] = {entry.name: entry for entry in _BUNDLED}
