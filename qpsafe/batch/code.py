@@ -19,7 +19,7 @@ FIXED, RESTS, CYCLES, ENDS = range(4)
 #: Floats of a knot of a trajectory: pose, twist, turn to the next knot and the turn's rate there.
 POSE, TWIST, TURN, TURN_RATE, KNOT = 0, 16, 22, 25, 28
 
-#: A robot's clock: time on the path, rate, for how long danger has been small. A return: duration, time since its start.
+#: A robot's clock: time on the path, rate, how long danger has been small. A return: duration, time since its start.
 TIME, RATE, QUIET = range(3)
 DURATION, SINCE = range(2)
 #: A robot's marks.

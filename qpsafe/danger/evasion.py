@@ -149,7 +149,7 @@ class Evasion:
         beyond that the limits cut single joints, which turns the direction of the evasion. D is the same for all joints
         so that q̇0 follows the steepest way out; a D of its own for each would turn a wrist, whose lever is short, as
         fast as a shoulder, to no use, and it chatters where a point changes from link to link. M_j/D is b = 0.3 of the
-        time v_j/a_j that the joint needs to its largest speed: the filter smooths, the acceleration limits set the pace.
+        time v_j/a_j that a joint needs to its largest speed: the filter smooths, the acceleration limits set the pace.
         M = 4, D = 20 of the first experiment are what s = 1/4, b = 0.6 give on the IRB 140; its own are 1 and 10.
 
         Stability: moving away takes force away, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive: a point at rest is
