@@ -36,11 +36,11 @@ class RecoveryRules:
         enabled: False to compare: the path goes on whatever happens, and CLIK alone pulls the robot back.
 
     Raises:
-        ConfigurationError: A value is not a finite number > 0, or `acceleration` is more than 1.
+        ConfigurationError: A value is not a finite number > 0 (`dwell` may be 0), or a share is more than 1.
     """
 
-    speed: float = 0.25
-    angular_speed: float = 0.8
+    speed: float = 0.5
+    angular_speed: float = 1.6
     joint_speed: float = 0.8
     shortest: float = 0.4
     fade: float = 0.1
@@ -55,13 +55,13 @@ class RecoveryRules:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name in ("enabled", "held"):
-                continue
-            if item.name == "dwell" and value == 0.0:
-                continue
-            if not (isinstance(value, int | float) and 0.0 < value < math.inf):
-                raise ConfigurationError("RecoveryRules", item.name, value, "a finite number > 0")
+            value, waits = getattr(self, item.name), item.name == "dwell"
+            if item.type == "bool":
+                if not isinstance(value, bool):
+                    raise ConfigurationError("RecoveryRules", item.name, value, "True or False")
+            elif not (isinstance(value, int | float) and (0.0 < value < math.inf or (waits and value == 0.0))):
+                expected = "a finite number >= 0" if waits else "a finite number > 0"
+                raise ConfigurationError("RecoveryRules", item.name, value, expected)
         for key in ("acceleration", "calm"):
             if getattr(self, key) > 1.0:
                 raise ConfigurationError("RecoveryRules", key, getattr(self, key), "a share in (0, 1]")
@@ -69,7 +69,7 @@ class RecoveryRules:
     @classmethod
     def paper(cls) -> RecoveryRules:
         """The way back begins as soon as danger falls below Δ(1-ε), section IV-C, at the pace of the first release."""
-        return cls(speed=0.25, angular_speed=0.8, joint_speed=0.8, calm=1.0, dwell=0.0, held=False)
+        return cls(speed=0.25, angular_speed=0.8, calm=1.0, dwell=0.0, held=False)
 
     def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
         """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""

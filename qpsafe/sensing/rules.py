@@ -30,8 +30,8 @@ class SensingRules:
         dead_after: A spot without a usable reading for this long is dead until acknowledged [s].
         dead_share: With more than this share of the spots unusable the robot stops.
         speed_cap: Largest speed of any point of the wire while a spot is dead, the reduced speed of ISO 10218 [m/s].
-        velocities: Whether approaching obstacles are estimated and fed to the kinetic field; the paper takes
-            them as standing still.
+        velocities: Whether the approach of obstacles is estimated and fed to the kinetic field; in the paper they stand
+            still.
 
     Raises:
         ConfigurationError: A value is not finite or out of range.

@@ -155,6 +155,7 @@ def test_any_plain_parts_give_the_same_bits(pairs: Any, come: Any, irb140: Any, 
     rules = qpsafe.RecoveryRules(
         speed=draw(st.floats(0.1, 1.0)), shortest=draw(st.floats(0.05, 0.5)), fade=draw(st.floats(0.02, 0.3)),
         acceleration=draw(st.floats(0.2, 1.0)), ramp=draw(st.floats(0.02, 0.4)), enabled=draw(st.booleans()),
+        calm=draw(st.floats(0.5, 1.0)), dwell=draw(st.floats(0.0, 0.4)), held=draw(st.booleans()),
     )  # fmt: skip
     evasion, share = (draw(st.floats(0.5, 5.0)), draw(st.floats(3.0, 20.0))), draw(st.floats(0.2, 1.0))
     law = qpsafe.HierarchicalLaw(damping=draw(st.sampled_from((0.0, 0.02))))

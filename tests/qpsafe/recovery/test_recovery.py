@@ -19,7 +19,8 @@ from qpsafe.tasks.trajectory import Sample
 
 DT, SAFE, MEDIUM, DANGEROUS = 0.01, 1.0, 9.0, 20.0
 ACTIVE = {SAFE: (1.0, 1.0), MEDIUM: (1.0, 0.0), DANGEROUS: (0.0, 0.0)}
-RAMP = RecoveryRules().ramp
+PAPER = RecoveryRules.paper()  # what is the paper's; `test_one_visit` is about the rest
+RAMP = PAPER.ramp
 
 
 class Event(NamedTuple):
@@ -62,7 +63,7 @@ class World:
     def __init__(self, events: bool = True) -> None:
         path = Line() if events else Plain()
         self.tasks = (PositionTask("tcp", path), OrientationTask("tcp", path))
-        self.recovery = Recovery(self.tasks, 9.775, DT)
+        self.recovery = Recovery(self.tasks, 9.775, DT, PAPER)
         self.pose = np.eye(4)
         self.samples: tuple[Sample, ...] = ()
         self.events: list[str] = []
@@ -166,7 +167,7 @@ def test_a_return_begins_with_the_speed_of_the_robot() -> None:
 
 def test_a_task_faster_than_a_return_is_held_until_its_motion_has_run_out() -> None:
     """No step in its speed when danger goes: it fades with a time constant, then the return begins from there."""
-    world, rules, fast = World(), RecoveryRules(), 0.6
+    world, rules, fast = World(), PAPER, 0.6
     world.run(10, SAFE)
     world.run(1, DANGEROUS)
     for _ in range(5):
@@ -318,7 +319,7 @@ def test_times_are_set_back_when_the_robot_could_not_go_along() -> None:
 
 def test_nothing_waits_for_a_posture() -> None:
     path = Line()
-    recovery = Recovery((PositionTask("tcp", path), PostureTask(np.ones(6))), 9.775, DT)
+    recovery = Recovery((PositionTask("tcp", path), PostureTask(np.ones(6))), 9.775, DT, PAPER)
     for danger in [SAFE, *[DANGEROUS] * 3]:
         recovery.update(danger, State(path.sample(recovery.path_time).pose), ACTIVE[danger])  # type: ignore[arg-type]
     here = State(path.sample(recovery.path_time).pose)
@@ -339,7 +340,7 @@ def test_without_recovery_the_path_goes_on_whatever_happens() -> None:
 
 
 @pytest.mark.parametrize(
-    "key", ["speed", "angular_speed", "joint_speed", "shortest", "fade", "acceleration", "tolerance", "ramp"]
+    "key", ["speed", "angular_speed", "joint_speed", "shortest", "fade", "acceleration", "tolerance", "ramp", "calm"]
 )
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "fast"])
 def test_rules_that_cannot_be_are_refused_by_name(key: str, value: object) -> None:
