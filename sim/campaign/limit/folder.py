@@ -159,7 +159,7 @@ def _read(file: Path, head: dict[str, Any]) -> list[Limit]:
     """The limits of a file; a last line that was cut off is none."""
     try:
         first, *lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-        there = json.loads(first)
+        there = dict(json.loads(first))
         whole = [json.loads(line) for line in lines if line.endswith("\n")]
         limits = [limit_from(said) for said in whole]
     except (OSError, ValueError, TypeError, AttributeError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import nan
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 
 class Limit(NamedTuple):
@@ -72,9 +72,9 @@ def limit_from(said: Mapping[str, Any]) -> Limit:
     if said.keys() != set(Limit._fields):
         raise ValueError(f"a limit with {', '.join(said)}")
     values: list[Any] = []
-    for name, kind in Limit.__annotations__.items():
-        value = nan if said[name] is None and kind == "float" else said[name]
-        if type(value).__name__ != kind:
-            raise ValueError(f"{name} = {value!r}: expected {kind}")
+    for name, kind in get_type_hints(Limit).items():
+        value = nan if said[name] is None and kind is float else said[name]
+        if type(value) is not kind:
+            raise ValueError(f"{name} = {value!r}: expected {kind.__name__}")
         values.append(value)
     return Limit(*values)
