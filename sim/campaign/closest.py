@@ -95,20 +95,41 @@ def smallest(station: Station, q: Array, pairs: Index) -> float:
         q: (T, n) [rad].
         pairs: Such as `Distances.own` (m, 2).
     """
-    world, robot = station.world, station.robot
-    bodies, supports = world.index[pairs, BODY], robot.tree.supports
-    # joints that move one of the two and not the other change their distance by no more than the way of its points
-    ways = np.abs(supports[bodies[:, 0]] - supports[bodies[:, 1]]) * _ways(station)
-    work = np.empty(PAIR + 3 * len(world.names) + 1)
-    return float(
-        _along_pairs(
-            np.ascontiguousarray(q), *robot.tree, pairs, *world.solid, np.ascontiguousarray(ways),
-            np.full(len(pairs), -np.inf), np.empty(robot.memory), work, np.empty(7),
-        )
-    )  # fmt: skip
+    return PairsAlong(station, pairs).smallest(q)
 
 
-def _ways(station: Station) -> Array:
+class PairsAlong:
+    """Pairs of shapes, to be measured along many runs that begin alike.
+
+    Args:
+        station: With robot and world.
+        pairs: Such as `Distances.own` (m, 2).
+        start: Joint position at which the runs begin (n,) [rad]; None where they begin anywhere.
+    """
+
+    def __init__(self, station: Station, pairs: Index, start: Array | None = None) -> None:
+        world, robot = station.world, station.robot
+        bodies, supports = world.index[pairs, BODY], robot.tree.supports
+        # joints that move one of the two and not the other change their distance by no more than the way of its points
+        ways = np.abs(supports[bodies[:, 0]] - supports[bodies[:, 1]]) * ways_of(station)
+        self._fixed = (*robot.tree, pairs, *world.solid, np.ascontiguousarray(ways))
+        self._work = np.empty(robot.memory), np.empty(PAIR + 3 * len(world.names) + 1), np.empty(7)
+        self._least, self._bounds = np.full(len(pairs), -np.inf), np.empty(len(pairs))
+        if start is not None:
+            _along_pairs(start[None], *self._fixed, 0.0, self._least, *self._work)
+
+    def smallest(self, q: Array, at_most: float = np.inf) -> float:
+        """Smallest distance in a run [m]; `at_most` if none is smaller.
+
+        Args:
+            q: (T, n) [rad]; its first row is `start`, if there is one.
+            at_most: Larger distances are not looked for [m].
+        """
+        self._bounds[:] = self._least
+        return float(_along_pairs(np.ascontiguousarray(q), *self._fixed, at_most, self._bounds, *self._work))
+
+
+def ways_of(station: Station) -> Array:
     """How far a point of the robot moves at most for each unit of a joint (n,) [m/rad, 1]."""
     tree, robot, world = station.robot.tree, station.robot, station.world
     slides = np.abs(tree.axes[:, :3]).any(axis=1)
@@ -151,20 +172,20 @@ def _along_people(
 
 
 @entry(
-    types.float64(_two, *_tree, _pairs, _pairs, _two, *hull_types, _two, *[types.float64[::1]] * 4),
+    types.float64(_two, *_tree, _pairs, _pairs, _two, *hull_types, _two, types.float64, *[types.float64[::1]] * 4),
     *nearest.USES, nearest, compiled,
 )  # fmt: skip
 def _along_pairs(
     q: Array, parents: Index, placements: Array, axes: Array, supports: Array, end_bodies: Index, end_places: Array,
     pairs: Index, index: Index, shapes: Array, vertices: Array, starts: Index, neighbours: Index, planes: Array,
-    ways: Array, least: Array, memory: Array, work: Array, found: Array,
+    ways: Array, at_most: float, least: Array, memory: Array, work: Array, found: Array,
 ) -> float:  # fmt: skip
-    """The smallest distance of all ticks.
+    """The smallest distance of all ticks, `at_most` if none is smaller.
 
     Every pair has a lower bound of its distance, `least`, which falls as joints move: a pair is measured where it could
     be the nearest one.
     """
-    n, best = q.shape[1], np.inf
+    n, best = q.shape[1], at_most
     for k in range(q.shape[0]):
         placed = False
         for p in range(pairs.shape[0]):

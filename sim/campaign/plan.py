@@ -200,7 +200,7 @@ def code_digest() -> str:
 
 
 #: Endings of what decides, and folders of what only shows.
-_CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", "report", "plugins", "irc5"}
+_CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", "report", "limit", "plugins", "irc5"}
 
 
 def _inside(path: Path) -> list[Path]:

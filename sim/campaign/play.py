@@ -25,7 +25,7 @@ from qpsafe.robot.kinematics import Index, cut, forward
 from qpsafe.sim.campaign import servo
 from qpsafe.sim.campaign.opponents.registry import NOTHING, SPOTS, Opponent
 from qpsafe.sim.campaign.recording import Recording
-from qpsafe.sim.campaign.servo import DT, OMEGA, follow
+from qpsafe.sim.campaign.servo import DT, served
 from qpsafe.sim.engine import spot_rays
 from qpsafe.sim.engine.spot_rays import read_spots, work_size
 
@@ -141,16 +141,4 @@ def _play(
                 seen[k, p, c] = w.points[p, c]
         if k + 1 == ticks:
             break
-        after, rate = view(runs, (k + 1) * n, (n,)), view(runs, (ticks + k + 1) * n, (n,))
-        if delay == 0:
-            for j in range(n):
-                after[j], rate[j] = s.q[j], s.qd[j]
-        elif k < delay:
-            for j in range(n):
-                after[j], rate[j] = q[j], qd[j]
-        else:
-            at = k - delay
-            follow(
-                q, qd, view(runs, (2 * ticks + at) * n, (n,)), view(runs, (3 * ticks + at) * n, (n,)), OMEGA, DT,
-                after, rate,
-            )  # fmt: skip
+        served(runs, k, delay)

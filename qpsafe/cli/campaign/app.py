@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from qpsafe.cli.campaign.limit import limit
 from qpsafe.cli.campaign.run import report, run
 from qpsafe.cli.campaign.single import show, worst
 from qpsafe.cli.common import Group
@@ -19,4 +20,5 @@ app = typer.Typer(cls=CampaignGroup, help="Meet people by the thousand, each tim
 app.command("run")(run)
 app.command("show")(show)
 app.command("worst")(worst)
+app.command("limit")(limit)
 app.command("report")(report)

@@ -3,34 +3,69 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from qpsafe.cli.common import progress_bar
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from rich.console import Console
+
     from qpsafe.sim.campaign.plan import Plan
+    from qpsafe.sim.campaign.worst.cases import Case
 
 WORKERS = os.cpu_count() or 1
 
 File = Annotated[Path | None, typer.Argument(help="A plan, see docs/files.md; options go before what it says.")]
-Seed = Annotated[int | None, typer.Option(help="Of the first trial; the others' follow one by one.")]
-Robot = Annotated[str | None, typer.Option(help="A bundled robot, or the path of a robot folder, MJCF or URDF file.")]
-Motions = Annotated[str | None, typer.Option(help="hold, line, pick or programs' files, separated by commas.")]
-Sight = Annotated[str | None, typer.Option("--sensor", help="What they see by: ideal, sharp or perfect.")]
-Lag = Annotated[float | None, typer.Option(help="Of the servos, a multiple of 0.004 [s]; 0: they follow perfectly.")]
-People = Annotated[
-    Path | None, typer.Option(help="A TOML file with a model of people or a story, or a folder of these.")
-]
+FileOption = Annotated[Path | None, typer.Option("--file", help="A plan, see docs/files.md; options go before it.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")]
 Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler, which takes the place of --workers.")]
+Json = Annotated[bool, typer.Option("--json", help="Write what came of it as JSON to standard output.")]
+
+#: Options that make a plan, by its keys.
+PLAN = {
+    "seed": Annotated[int | None, typer.Option(help="Of the first trial; the others' follow one by one.")],
+    "robot": Annotated[
+        str | None, typer.Option(help="A bundled robot, or the path of a robot folder, MJCF or URDF file.")
+    ],
+    "motions": Annotated[str | None, typer.Option(help="hold, line, pick or programs' files, separated by commas.")],
+    "sensor": Annotated[str | None, typer.Option(help="What they see by: ideal, sharp or perfect.")],
+    "lag": Annotated[
+        float | None, typer.Option(help="Of the servos, a multiple of 0.004 [s]; 0: they follow perfectly.")
+    ],
+    "people": Annotated[
+        Path | None, typer.Option(help="A TOML file with a model of people or a story, or a folder of these.")
+    ],
+}
+#: What was typed of them, by the plan's keys; None for what was not.
+Typed = dict[str, Any]
+
+
+def planned(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `PLAN`, all of which come to it in one argument, `typed`."""
+    own = signature(command, eval_str=True)
+    options = [Parameter(key, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for key, kind in PLAN.items()]
+    others = [part.replace(kind=Parameter.KEYWORD_ONLY) for part in own.parameters.values() if part.name != "typed"]
+
+    @wraps(command)
+    def whole(**given: Any) -> None:
+        command(typed={key: given.pop(key) for key in PLAN}, **given)
+
+    place = [*own.parameters].index("typed")
+    parameters = [*others[:place], *options, *others[place:]]
+    whole.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    whole.__annotations__ = {part.name: part.annotation for part in parameters}
+    return whole
 
 
 def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
@@ -73,3 +108,58 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
 
     with dask_executor(address) as executor:
         yield executor
+
+
+@contextmanager
+def counting(what: str, screen: Console) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar; what was there at the beginning does not count for the time left.
+
+    Args:
+        what: Is counted.
+        screen: Where to.
+    """
+    with progress_bar(screen) as progress:
+        task = progress.add_task(what, total=None)
+
+        def count(done: int, total: int) -> None:
+            if progress.tasks[0].total is None:
+                progress.reset(task, completed=done, total=total)
+            else:
+                progress.update(task, completed=done)
+
+        yield count
+
+
+def case_of(where: str, text: str, others: str = "") -> tuple[Case | None, str]:
+    """The case of a file and a name for what is written of it; None where the number of a trial is meant.
+
+    Args:
+        where: The command, for the error.
+        text: What was typed.
+        others: What else it may be, for the error.
+    """
+    from qpsafe.sim.campaign.worst.cases import load_case
+
+    file, _, number = text.rpartition("#")
+    if not number.isdecimal():
+        expected = f"the number of a trial, or FILE.json#K with the number of a case{others}"
+        raise ConfigurationError(where, "TRIAL", text, expected)
+    return (load_case(Path(file), int(number)), f"{Path(file).stem}-{number}") if file else (None, "")
+
+
+def one_trial(
+    where: str, case: Case | None, file: Path | None, typed: Typed, controller: str | None
+) -> tuple[Plan, str]:  # fmt: skip
+    """The plan of one trial, or case, and whose run is meant: the case's controller, or `default`, if nobody is named.
+
+    Args:
+        where: The command, for the error.
+        case: See `case_of`.
+        file: The plan's, None if there is none.
+        typed: Options that make a plan.
+        controller: Its name, if it was typed.
+    """
+    if case is not None and file is not None:
+        raise ConfigurationError(where, "--file", str(file), "none: a case has its plan with it")
+    name = controller or (case.controller if case else "default")
+    return make_plan(case.plan if case else file, **typed, controllers=name), name

@@ -13,40 +13,33 @@ from qpsafe.cli.campaign.options import (
     WORKERS,
     Dask,
     File,
-    Lag,
-    Motions,
-    People,
-    Robot,
-    Seed,
-    Sight,
+    Json,
+    Typed,
     Workers,
+    counting,
     executor_at,
     make_plan,
+    planned,
 )
-from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.common import console, print_json, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.console import Console
 
     from qpsafe.sim.campaign.runner import Results
 
 
+@planned
 def run(
+    *,
     file: File = None,
     quick: Annotated[bool, typer.Option("--quick", help="48 trials, two minutes; only --out keeps them.")] = False,
     trials: Annotated[int | None, typer.Option(help="How many; 3,000 by default.")] = None,
-    seed: Seed = None,
     controllers: Annotated[str | None, typer.Option(help="Names of whom to compare, separated by commas.")] = None,
-    robot: Robot = None,
-    motions: Motions = None,
-    sensor: Sight = None,
-    lag: Lag = None,
-    people: People = None,
+    typed: Typed,
     workers: Workers = WORKERS,
     dask: Dask = None,
     out: Annotated[
@@ -56,7 +49,7 @@ def run(
             callback=output_folder,
         ),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+    json: Json = False,
 ) -> None:
     """Play a campaign: in every trial the same people meet the robot under every controller, one after the other.
 
@@ -71,16 +64,11 @@ def run(
     plan = make_plan(
         file,
         trials=QUICK if quick and trials is None else trials,
-        seed=seed,
         controllers=controllers,
-        robot=robot,
-        motions=motions,
-        sensor=sensor,
-        lag=lag,
-        people=people,
+        **typed,
     )
     folder = Path("out") / f"campaign-{plan.digest()[:8]}" if out is None and not quick else out
-    with executor_at(dask) as executor, _kept(folder, screen), _counting("trials", screen) as count:
+    with executor_at(dask) as executor, _kept(folder, screen), counting("trials", screen) as count:
         results = run_campaign(
             plan,
             folder,
@@ -97,7 +85,7 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the report; by default the campaign's.", callback=output_folder)
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
+    json: Json = False,
 ) -> None:
     """Judge and report again what a folder holds, be it finished or not.
 
@@ -106,22 +94,7 @@ def report(
     screen = console(json)
     from qpsafe.sim.campaign.runner import stored_results
 
-    _report(stored_results(folder), out or folder, screen, json)
-
-
-@contextmanager
-def _counting(what: str, screen: Console) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar; what was there at the beginning does not count for the time left."""
-    with progress_bar(screen) as progress:
-        task = progress.add_task(what, total=None)
-
-        def count(done: int, total: int) -> None:
-            if progress.tasks[0].total is None:
-                progress.reset(task, completed=done, total=total)
-            else:
-                progress.update(task, completed=done)
-
-        yield count
+    _report(stored_results(folder), out or folder, screen, json, folder)
 
 
 @contextmanager
@@ -141,14 +114,27 @@ def _kept(folder: Path | None, screen: Console) -> Iterator[None]:
         raise
 
 
-def _report(results: Results, folder: Path | None, screen: Console, json: bool) -> None:
-    """Judge, write, print; exit code 1 if there are faults."""
+def _report(
+    results: Results, folder: Path | None, screen: Console, json: bool, trials: Path | None = None
+) -> None:  # fmt: skip
+    """Judge, write, print; exit code 1 if there are faults.
+
+    Args:
+        results: What there is.
+        folder: For the report; None for none.
+        screen: Where to.
+        json: Whether to print JSON.
+        trials: Folder of the trials, if it is another one.
+    """
+    from qpsafe.sim.campaign.limit.folder import stored_limits
     from qpsafe.sim.campaign.report.page import report_page
     from qpsafe.sim.campaign.report.summary import summary
     from qpsafe.sim.campaign.speed import engine_speed
 
-    with _counting("resampling", screen) as count:
-        found = summary(results, count, engine_speed(results.plan, trials=3).engine)
+    kept = trials or folder
+    limits = {} if kept is None else stored_limits(kept, results)
+    with counting("resampling", screen) as count:
+        found = summary(results, count, engine_speed(results.plan, trials=3).engine, limits)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "report.json", json_text(found) + "\n")

@@ -11,66 +11,53 @@ import typer
 from qpsafe.cli.campaign.options import (
     WORKERS,
     Dask,
-    Lag,
-    Motions,
-    People,
-    Robot,
-    Seed,
-    Sight,
+    FileOption,
+    Json,
+    Typed,
     Workers,
+    case_of,
+    counting,
     executor_at,
     make_plan,
+    one_trial,
+    planned,
 )
-from qpsafe.cli.common import console, print_json, progress_bar, write_text
+from qpsafe.cli.common import console, print_json, write_text
 from qpsafe.cli.outputs import output_folder
-from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
 from qpsafe.text.words import file_word
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from qpsafe.sim.campaign.worst.cases import Case
     from qpsafe.sim.campaign.worst.search import Found
 
 
+@planned
 def show(
+    *,
     trial: Annotated[str, typer.Argument(help="Its number, or FILE.json#K: case K that `worst` has written.")],
     controller: Annotated[
         str | None, typer.Option(help="Who is to be seen; by default the one of a case, or `default`.")
     ] = None,
-    plan: Annotated[Path | None, typer.Option("--file", help="The plan's file, if it has one.")] = None,
-    seed: Seed = None,
-    robot: Robot = None,
-    motions: Motions = None,
-    sensor: Sight = None,
-    lag: Lag = None,
-    people: People = None,
+    plan: FileOption = None,
+    typed: Typed,
     out: Annotated[Path, typer.Option(help="Folder for video and table.", callback=output_folder)] = Path(
         "out/campaign-show"
     ),
-    json: Annotated[bool, typer.Option("--json", help="Write the trial's row as JSON to standard output.")] = False,
+    json: Json = False,
 ) -> None:
     """Play one trial again in the full MuJoCo scene: a video, and a table of all its ticks."""
     screen = console(json)
-    case, label = _case(trial)
-    if controller is None:
-        controller = case.controller if case else "default"
-    if case is not None and plan is not None:
-        raise ConfigurationError("qpsafe campaign show", "--file", str(plan), "none: a case has its plan with it")
-    made = make_plan(
-        case.plan if case else plan, seed=seed, robot=robot, motions=motions, sensor=sensor, lag=lag, people=people,
-        controllers=controller,
-    )  # fmt: skip
+    case, label = case_of("qpsafe campaign show", trial)
+    made, name = one_trial("qpsafe campaign show", case, plan, typed, controller)
     what = case.encounter if case else int(trial)
     from qpsafe.sim.campaign.show import show as play
 
-    with progress_bar(screen) as progress:
-        task = progress.add_task("ticks", total=None)
+    with counting("ticks", screen) as count:
         shown = play(
-            made, what, controller, out, label=label,
+            made, what, name, out, label=label, progress=count,
             notice=lambda text: screen.print(text, style="yellow"),
-            progress=lambda done, total: progress.update(task, completed=done, total=total),
         )  # fmt: skip
     if json:
         print_json(shown.row)
@@ -100,33 +87,19 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
     screen.print(sheet)
 
 
-def _case(text: str) -> tuple[Case | None, str]:
-    """The case of a file and a name for what is written of it; None where the number of a trial is meant."""
-    from qpsafe.sim.campaign.worst.cases import load_case
-
-    file, _, number = text.rpartition("#")
-    if not number.isdecimal():
-        expected = "the number of a trial, or FILE.json#K with the number of a case"
-        raise ConfigurationError("qpsafe campaign show", "TRIAL", text, expected)
-    return (load_case(Path(file), int(number)), f"{Path(file).stem}-{number}") if file else (None, "")
-
-
+@planned
 def worst(
+    *,
     controller: Annotated[str, typer.Argument(help="Whose worst case.")],
     trials: Annotated[int, typer.Option(min=1, help="For the search, and as many again at random.")] = 2000,
-    plan: Annotated[Path | None, typer.Option("--file", help="A plan, see docs/files.md.")] = None,
-    seed: Seed = None,
-    robot: Robot = None,
-    motions: Motions = None,
-    sensor: Sight = None,
-    lag: Lag = None,
-    people: People = None,
+    plan: FileOption = None,
+    typed: Typed,
     workers: Workers = WORKERS,
     dask: Dask = None,
     out: Annotated[Path, typer.Option(help="Folder for the cases.", callback=output_folder)] = Path(
         "out/campaign-worst"
     ),
-    json: Annotated[bool, typer.Option("--json", help="Write the cases as JSON to standard output.")] = False,
+    json: Json = False,
 ) -> None:
     """Search for the worst encounter of a controller, among all that the model of people allows, by CMA-ES.
 
@@ -136,19 +109,9 @@ def worst(
     from qpsafe.sim.campaign.worst.cases import cases_to_dict, find_worst
     from qpsafe.sim.campaign.worst.search import WANTED
 
-    made = make_plan(
-        plan, seed=seed, robot=robot, motions=motions, sensor=sensor, lag=lag, people=people, controllers=controller
-    )
-    with executor_at(dask) as executor, progress_bar(screen) as progress:
-        task = progress.add_task("trials", total=None)
-        found = find_worst(
-            made,
-            controller,
-            trials,
-            executor,
-            lambda done, total: progress.update(task, completed=done, total=total),
-            workers=workers,
-        )
+    made = make_plan(plan, **typed, controllers=controller)
+    with executor_at(dask) as executor, counting("trials", screen) as count:
+        found = find_worst(made, controller, trials, executor, count, workers=workers)
     out.mkdir(parents=True, exist_ok=True)
     file = out / f"worst-{file_word(controller)}.json"
     table = cases_to_dict(made, controller, found)

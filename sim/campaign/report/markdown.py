@@ -4,6 +4,7 @@ A table stands between two comments, the first of which says what is in it:
 
     <!-- campaign: columns -->                  what a row holds
     <!-- campaign: measures -->                 what is made of rows
+    <!-- campaign: limits -->                   what is made of limits
     <!-- campaign: contacts, energy_p95 -->     controllers by these measures, with limits
     <!-- campaign: less stop: contacts -->      differences to a reference
     <!-- campaign: end -->
@@ -16,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.report.limits import MEASURES as LIMITS
 from qpsafe.sim.campaign.report.measures import FIGURES, MEASURES, SHARES
 from qpsafe.sim.campaign.rows import COLUMNS
 
@@ -49,6 +51,9 @@ def _table(what: str, found: dict[str, Any] | None) -> str:
         shares = [(m.title, f"`{m.name}`", "trials", m.meaning) for m in SHARES]
         figures = [(m.title, f"`{m.name}`", m.unit, m.meaning) for m in FIGURES]
         return _lines(("measure", "in JSON", "unit shown", "definition"), shares + figures)
+    if what == "limits":
+        lines = [(m.title, f"`{m.name}`", m.unit, m.meaning) for m in LIMITS]
+        return _lines(("measure", "in JSON", "unit shown", "definition"), lines)
     less, _, names = what.rpartition(": ")
     unknown = [name for name in names.split(", ") if name not in MEASURES]
     if found is None or unknown or (less and less.removeprefix("less ") not in found["references"]):

@@ -8,6 +8,7 @@ from typing import Any
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.report.figures import distance_figure, energy_figure, harm_figure, kinds_figure, svg
 from qpsafe.sim.campaign.report.html import Html, element, joined, page, table
+from qpsafe.sim.campaign.report.limits import limits_section
 from qpsafe.sim.campaign.report.measures import FIGURES, MEASURES, SHARES, FigureMeasure, ShareMeasure, percent
 from qpsafe.sim.campaign.rows import COLUMNS, of_controller
 from qpsafe.sim.campaign.runner import Results
@@ -59,6 +60,8 @@ def _sections(results: Results, found: dict[str, Any]) -> Iterator[Html]:
     yield _figure(
         svg(kinds_figure(controllers), "kinds"), "What the robot's touching point did one tick before contact."
     )
+    if "limits" in found:
+        yield limits_section(found["limits"], {name: controllers[name]["contacts"] for name in found["limits"]})
     yield element("h2", "Distances and energies")
     yield _figure(svg(distance_figure(rows), "distance"), "All trials; up to the largest controller's 95 %.")
     yield _figure(svg(energy_figure(rows), "energy"), "All trials; those without contact count as 0.")

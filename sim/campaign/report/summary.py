@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.limit.row import Limit
 from qpsafe.sim.campaign.report.comparisons import REFERENCES, Comparison, Judged, judge
 from qpsafe.sim.campaign.report.findings import findings
+from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
 from qpsafe.sim.campaign.report.statistics import CONFIDENCE, Share, share
 from qpsafe.sim.campaign.rows import CLASSES, Columns, of_controller
@@ -32,7 +34,10 @@ METHODS = (
 
 
 def summary(
-    results: Results, progress: Callable[[int, int], None] | None = None, speed: float | None = None
+    results: Results,
+    progress: Callable[[int, int], None] | None = None,
+    speed: float | None = None,
+    limits: Mapping[str, Sequence[Limit]] | None = None,
 ) -> dict[str, Any]:
     """Everything that a report says, for JSON.
 
@@ -42,6 +47,7 @@ def summary(
         results: With at least one finished trial.
         progress: Called with resamples done and wanted.
         speed: Of the engine with the default controller, see `engine_speed`; None where it was not timed.
+        limits: What was possible in the contacts of some controllers; None where that was not searched.
 
     Raises:
         ConfigurationError: No trial is finished.
@@ -58,6 +64,7 @@ def summary(
         "comparisons": [_comparison(item) for item in judged.comparisons],
         "references": [name for name in REFERENCES if name in rows],
         "worst": {name: worst(mine) for name, mine in rows.items()},
+        **({"limits": {name: limits_summary(found) for name, found in limits.items()}} if limits else {}),
         "engine": {
             "simulated_s_per_wall_s": speed,
             "all_controllers_s_per_process_s": results.speed,

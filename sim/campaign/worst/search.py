@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.worst.strategy import strategy
 
 Array = NDArray[np.float64]
 
@@ -182,35 +183,23 @@ def _climb(
     play: Callable[[Array], list[Case]], rng: np.random.Generator, start: Array, free: NDArray[np.bool_], budget: int
 ) -> Iterator[Case]:
     """CMA-ES from a case, until it stands still or its budget is spent."""
-    try:
-        import cma
-    except ImportError as error:
-        raise MissingExtraError(f"to search needs cma: pip install 'qpsafe[campaign]' ({error})") from error
-
     if free.sum() < 2:  # nothing that CMA-ES could adapt to
         points = np.tile(start, (budget, 1))
         points[:, free] = rng.random((budget, int(free.sum())))
         yield from play(points)
         return
-    options = {
-        "bounds": [0.0, 1.0],
-        "seed": np.nan,  # its random numbers are ours
-        "randn": lambda *shape: rng.standard_normal(shape),
-        "verbose": -9,
-        "verb_log": 0,
-        "tolfun": 1e-6,
-        "tolx": 1e-4,
-    }
-    strategy = cma.CMAEvolutionStrategy(np.clip(start[free], 1e-6, 1.0 - 1e-6), STEP, options)
-    while budget > 0 and not strategy.stop():
-        asked = np.array(strategy.ask())
+    climb = strategy(
+        np.clip(start[free], 1e-6, 1.0 - 1e-6), STEP, rng, bounds=[0.0, 1.0], tolfun=1e-6, tolx=1e-4
+    )  # fmt: skip
+    while budget > 0 and not climb.stop():
+        asked = np.array(climb.ask())
         points = np.tile(start, (len(asked), 1))
         points[:, free] = np.clip(asked, 0.0, 1.0)
         if len(points) > budget:  # the last few cannot be told to it
             yield from play(points[:budget])
             return
         cases = play(points)
-        strategy.tell(asked, [min(-case.harm, 1e9) for case in cases])
+        climb.tell(asked, [min(-case.harm, 1e9) for case in cases])
         budget -= len(cases)
         yield from cases
 

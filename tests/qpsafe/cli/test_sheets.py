@@ -32,12 +32,14 @@ from qpsafe.cli import (
     story,
     stream_report,
 )
+from qpsafe.cli.campaign import limit, single
 from qpsafe.cli.campaign import run as campaign
-from qpsafe.cli.campaign import single
 from qpsafe.cli.demos import all_robots, fast_person, fixed, path, pick_and_place
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot
+from qpsafe.sim.campaign.limit.row import Limit
 from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.worst.search import Case, Found
 
 HOSTILE = "arm[/x] [red]b[/] :smile: [0m]"
@@ -255,6 +257,12 @@ def of_worst(screen: Console, folder: Path) -> None:
     single._show_cases(found, Path("out") / HOSTILE, "none", screen)
 
 
+def of_limit(screen: Console, folder: Path) -> None:
+    row = Limit(2999, 1002999, "hold", HOSTILE, 1.5, -0.1, -0.2, 0.04, 0.05, True, True, True, -0.98, 12345)
+    limit._show(row, screen)
+    limit._show_summary(HOSTILE, limits_summary([row] * 1234), screen)
+
+
 def of_checks(screen: Console, folder: Path) -> None:
     of_fixed(screen, folder)
 
@@ -269,6 +277,8 @@ TABLES: dict[Callable[..., None], Show] = {
     campaign._show_differences: of_campaign,
     single._show_row: of_trial,
     single._show_cases: of_worst,
+    limit._show: of_limit,
+    limit._show_summary: of_limit,
     common.show_checks: of_checks,
     compare._show: of_compare,
     fixed.show: of_fixed,

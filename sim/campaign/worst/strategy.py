@@ -1,0 +1,31 @@
+"""CMA-ES of the package `cma`, quiet, and with random numbers of ours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import MissingExtraError
+
+
+def strategy(start: NDArray[np.float64], step: float, rng: np.random.Generator, **options: Any) -> Any:
+    """A strategy to be asked and told, which minimises.
+
+    Args:
+        start: Where it begins (d,).
+        step: Its first standard deviation.
+        rng: Of all its random numbers.
+        options: More of cma's.
+
+    Raises:
+        MissingExtraError: cma is not installed.
+    """
+    try:
+        import cma
+    except ImportError as error:
+        raise MissingExtraError(f"to search needs cma: pip install 'qpsafe[campaign]' ({error})") from error
+
+    quiet = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9, "verb_log": 0}
+    return cma.CMAEvolutionStrategy(start, step, quiet | options)
