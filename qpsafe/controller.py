@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
-from qpsafe.danger.separation_limit import SeparationLimit, oldest
+from qpsafe.danger.separation_limit import SeparationLimit, kept_apart
 from qpsafe.errors import in_words
 from qpsafe.gate.gated import NO_AGES, PASSED
 from qpsafe.gate.rules import VerifiedMotion
@@ -209,19 +209,17 @@ class SafetyController(Running):
             tasks, active, law = recovery.way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        limits, soft = self._limits, self._kept_clear(commanded)
+        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+        limits, soft = self._limits, (*self._kept_clear(commanded), *self._kept_apart(q, seen.points, old))
         if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
         given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
-        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
-        if barrier is None and separation is None:
+        if barrier is None:
             resolved = resolve(*given)
         else:
-            caps, age = (separation, barrier), oldest(old, self._rules.max_age)
-            here = as_joint_position(q, self._robot)
-            resolved = self._stages.resolve_under(caps, here, seen, age, resolve, given)
-        command = resolved.command
+            resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
+        command = resolved.command if separation is None else kept_apart(soft, resolved.command, resolved.box)
         usual = resolved.excess <= 1e-9 and resolved.solved
         messages = () if usual else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen

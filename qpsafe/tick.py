@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.danger.separation_limit import SeparationLevel
 from qpsafe.gate.gated import PASSED, Gated
 from qpsafe.geometry.clearance_level import ClearanceLevel
 from qpsafe.laws.problem import LawResult
@@ -118,6 +119,12 @@ class Tick:
         return tuple(x for rows in levels if isinstance(rows, ClearanceLevel) for x in rows.binding(self.reference.qd))
 
     @property
+    def separation(self) -> tuple[tuple[str, int, float], ...]:
+        """Parts of links that may not approach what is seen any faster: name, number of the point, distance [m]."""
+        levels = () if self.resolved is None else self.resolved.soft
+        return tuple(x for rows in levels if isinstance(rows, SeparationLevel) for x in rows.binding(self.reference.qd))
+
+    @property
     def residuals(self) -> tuple[tuple[float, tuple[float, ...]], ...]:
         """Per regime solved: (weight, residual norm per level, the evasive level last)."""
         return () if self.law is None else tuple((w, solution.residuals) for w, solution in self.law.regimes)
@@ -143,6 +150,8 @@ class Tick:
             lines.append(f"  gate: {self.gate}")
         for one, other, gap in self.clearance:
             lines.append(f"  kept clear: {one} and {other}, {1e3 * gap:.1f} mm apart")
+        for part, number, gap in self.separation:
+            lines.append(f"  held apart: {part} and point {number}, {1e3 * gap:.1f} mm away")
         lines.extend("  note: " + message for message in self.messages)
         qd = np.array2string(self.reference.qd, precision=4, suppress_small=True)
         lines.append(f"  q̇ = {qd} rad/s in {1e6 * self.solve_time:.0f} µs")

@@ -12,6 +12,7 @@ asks for is reached by braking less than a_s: S_p(v) - S_p(v') = v' dt, and S_p'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,20 +115,21 @@ class SeparationLimit(Fixed):
         return SeparationLevel(A[rows], upper[rows], names, rows % len(points), distances[rows])
 
 
-def kept_apart(level: SeparationLevel, command: Array, box: Box | None) -> Array:
-    """The velocity nearest to a command that meets the rows, as well as they can be met in the box.
+def kept_apart(soft: Sequence[Level], command: Array, box: Box | None) -> Array:
+    """The velocity nearest to a command that meets the rows of separation, as well as they can be met in the box.
 
-    What a law made under them as a soft level stays as it is; laws that take no notice of such levels need it.
+    What a law made under them as soft levels stays as it is; laws that take no notice of such levels need it.
 
     Args:
-        level: The rows.
+        soft: Levels under the joint limits, highest priority first; without rows of separation nothing is done.
         command: Joint velocity (n,) [rad/s], inside the box.
         box: Admissible velocities, if there are limits.
     """
-    if (level.A @ command <= level.upper + _MET).all():
+    apart = [level for level in soft if isinstance(level, SeparationLevel)]
+    if all((level.A @ command <= level.upper + _MET).all() for level in apart):
         return command
     bounds = (None, None) if box is None else (box.lower, box.upper)
-    nearest = solve_hierarchy([level, (np.eye(len(command)), command)], *bounds).qd
+    nearest = solve_hierarchy([*soft, (np.eye(len(command)), command)], *bounds).qd
     if not np.isfinite(nearest).all():
         return command
     return nearest if box is None else box.clip(nearest)

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
-from qpsafe.danger.separation_limit import SeparationLimit
+from qpsafe.danger.separation_limit import SeparationLevel, SeparationLimit, oldest
 from qpsafe.gate.pack import surroundings
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.geometry.clearance import ClearanceLimit, checked_clearance
@@ -32,6 +32,7 @@ from qpsafe.pipeline.checks import (
     checked_separation,
 )
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
+from qpsafe.sensing.detection import as_joint_position
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
@@ -274,4 +275,13 @@ class Parts:
         if self._clearance is None or self._limits is None:
             return ()
         rows = self._clearance.level(commanded, self._qd, self._limits)
+        return () if rows is None else (rows,)
+
+    def _kept_apart(self, measured: ArrayLike, points: NDArray[np.float64], ages: Any) -> tuple[SeparationLevel, ...]:
+        """Rows that keep links from approaching what is seen too fast, at the measured position (n,) [rad]."""
+        if self._separation is None:
+            return ()
+        state = self._robot.at(as_joint_position(measured, self._robot))
+        age = oldest(ages, self._rules.max_age)
+        rows = self._separation.level(state, self._stages.link_parts, points, age, qd=self._qd, limits=self._limits)
         return () if rows is None else (rows,)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qpsafe.danger.link_parts import LinkParts
-from qpsafe.danger.separation_limit import SeparationLimit, kept_apart
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.pipeline.checks import check_command
 from qpsafe.pipeline.resolve import Array, Resolve, Resolved
@@ -87,40 +86,31 @@ class Stages:
         return made
 
     def resolve_under(
-        self, caps: tuple[SeparationLimit | None, DangerBarrier | None], measured: Array, seen: Seen, age: float,
-        resolve: Resolve, given: Any,
-    ) -> Resolved:  # fmt: skip
-        """The same under speed and separation monitoring, above a cap on the danger field: soft levels directly under
-        the joint limits. The cap is then scaled exactly; a law that takes no notice of soft levels is corrected.
+        self, barrier: DangerBarrier, measured: Array, seen: Seen, resolve: Resolve, given: Any
+    ) -> Resolved:
+        """The same under a cap on the danger field: a soft level first, then scaled exactly.
 
         Args:
-            caps: Both, or one of them.
+            barrier: The cap.
             measured: Joint position (n,) [rad].
             seen: Detected points and their danger.
-            age: How old they are [s].
             resolve: The half of the tick.
-            given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits, soft levels above these,
-                as `resolve` takes them.
-        """  # fmt: skip
-        separation, barrier = caps
-        state, qd, limits = self._robot.at(measured), given[1], given[6]
-        apart = level = None
-        if separation is not None:
-            apart = separation.level(state, self._link_parts, seen.points, age, qd=qd, limits=limits)
-        if barrier is not None:
-            level = barrier.level(state, qd, seen.points, seen.danger)
-        resolved = resolve(*given[:7], (*given[7], *[rows for rows in (apart, level) if rows is not None]))
-        if barrier is not None:
-            # exact, as far as the acceleration limits allow
-            command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
-            resolved.command = command if resolved.box is None else resolved.box.clip(command)
-        if apart is not None:
-            resolved.command = kept_apart(apart, resolved.command, resolved.box)
+            given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits and soft levels, as
+                `resolve` takes them.
+        """
+        state = self._robot.at(measured)
+        commanded, qd, qdd, samples, qd0, active, limits, soft = given
+        level = barrier.level(state, qd, seen.points, seen.danger)
+        soft = (*soft, level) if level else soft
+        resolved = resolve(commanded, qd, qdd, samples, qd0, active, limits, soft)
+        # exact, as far as the acceleration limits allow
+        command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
+        resolved.command = command if resolved.box is None else resolved.box.clip(command)
         check_command(resolved.command, self._dt)
         return resolved
 
     @cached_property
-    def _link_parts(self) -> LinkParts:
+    def link_parts(self) -> LinkParts:
         """Capsules around the robot's links; those of its wire where its model has no collision geometry."""
         from qpsafe.gate.pack import robot_capsules
 

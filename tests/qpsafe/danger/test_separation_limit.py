@@ -115,7 +115,7 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
     tool, obeyed, binding, impossible = robot.tool_frames[0], 0, 0, 0
     for _ in range(20):
         figures = Separation(rng.uniform(0.5, 6.0), reaction_time=rng.uniform(0.0, 0.1))
-        controller = controller_with(robot, LAWS[law], figures, gate="off")
+        controller = controller_with(robot, LAWS[law], figures, gate="off", clearance="off")
         q, qd = some_state(robot, rng, share=0.1)
         controller.step(q, np.zeros(robot.nq), points=[])
         for _ in range(4):
@@ -139,7 +139,7 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
                 obeyed, binding = obeyed + 1, binding + (excess > -1e-6)
             else:
                 impossible += 1
-                again = kept_apart(level, tick.reference.qd, tick.box)
+                again = kept_apart([level], tick.reference.qd, tick.box)
                 broken = [float((np.maximum(level.A @ v - level.upper, 0.0) ** 2).sum()) for v in
                           (tick.reference.qd, again)]  # fmt: skip
                 assert broken[0] <= broken[1] + 1e-9
@@ -172,6 +172,28 @@ def test_going_towards_a_standing_point_never_breaks_a_row(law):
     free = np.linalg.norm(goal[:3, 3] - robot.pose("tcp", q)[:3, 3])
     assert free > 0.01  # and was held back
     assert distances.min() >= figures.standing - 1e-6
+
+
+def test_a_tick_says_which_link_is_held_apart_from_what():
+    goal = ROBOT.pose("tcp", ROBOT.home)
+    goal[:3, 3] += [0.2, 0.0, 0.0]
+    target = qpsafe.FixedPose(goal)
+    controller = qpsafe.SafetyController(
+        ROBOT, [qpsafe.PositionTask("tcp", target), qpsafe.OrientationTask("tcp", target)],
+        field=qpsafe.DangerField(static=0.0, kinetic=0.0), separation=SeparationLimit(Separation(3.0)), gate="off",
+    )  # fmt: skip
+    far, q, qd, held = [5.0, 0.0, 0.0], ROBOT.home, np.zeros(6), set()
+    assert controller.step(q, qd, points=[far, far]).separation == ()
+    for _ in range(250):
+        tick = controller.step(q, qd, points=[far, goal[:3, 3]])
+        q, qd = tick.reference.q, tick.reference.qd
+        held |= {part for part, _, _ in tick.separation}
+        for part, number, gap in tick.separation:
+            assert number == 1
+            assert gap > Separation(3.0).standing - 1e-6
+            assert part in PARTS["irb140"].names
+            assert f"held apart: {part} and point 1, " in tick.explain()
+    assert any(part.startswith("tool") for part in held)
 
 
 def test_moving_away_is_always_allowed():
