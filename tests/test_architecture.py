@@ -22,6 +22,7 @@ hqp.backends tasks
 hqp.solve danger
 sensing
 geometry
+gate
 laws recovery
 pipeline
 tick

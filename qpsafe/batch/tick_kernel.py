@@ -32,8 +32,8 @@ from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.compiled.memory import view
 from qpsafe.danger.evasion import filter_by
 from qpsafe.gate import gate_kernel
+from qpsafe.gate.braking_path import slow_down
 from qpsafe.gate.gate_kernel import let_through
-from qpsafe.pipeline.braking import slow_down
 from qpsafe.pipeline.resolve_kernel import given
 from qpsafe.pipeline.sense_kernel import (
     ENDS as WIRE_ENDS,

@@ -12,6 +12,14 @@ from qpsafe.compiled.compiled import Array, inline
 
 
 @inline
+def slow_down(qd: Array, acceleration: Array, dt: float, slower: Array) -> None:
+    """The velocity qd (n,) [rad/s] a tick later, braked as hard as allowed: inside the box."""
+    for j in range(qd.shape[0]):
+        most = acceleration[j] * dt
+        slower[j] = qd[j] - min(max(qd[j], -most), most)
+
+
+@inline
 def braked(v: float, a: float, dt: float, ticks: float) -> float:
     """Speed of a joint in tick number `ticks` (a whole number) after the command's: 0 is the command's own."""
     rest = abs(v) - ticks * a * dt

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.fixed import Fixed
 from qpsafe.gate import workspace
 from qpsafe.gate.gate_kernel import CAUSE, PERSON_NEAR, POINT, SHARE, SHORT, TOLD, WHO, let_through
 from qpsafe.gate.gated import PASSED, Gated
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Gate:
+class Gate(Fixed):
     """Verifies the commands of one robot.
 
     Args:
@@ -35,27 +36,20 @@ class Gate:
         max_age: Older readings do not count [s].
     """
 
+    fixed = frozenset(("robot", "rules", "limits", "max_age", "solids", "groups", "blocks"))
+
     def __init__(
         self, robot: Robot, rules: VerifiedMotion, limits: JointLimits, known: Sequence[Obstacle] = (),
         carried: Mapping[str, Sequence[Obstacle]] | None = None, max_age: float = 0.0,
     ) -> None:  # fmt: skip
-        self.robot, self.rules, self.max_age = robot, rules, max_age
+        self.robot, self.rules, self.limits, self.max_age = robot, rules, limits, max_age
         self.solids, self.groups = surroundings(robot, known, carried)
         self._fixed = len(self.solids.names) - len(known)  # the first known obstacle
         self._told = np.zeros(TOLD)
         self._work: tuple[Array, NDArray[np.int64]] = np.empty(0), np.empty(0, dtype=np.int64)
         self._room = -1
-        self.set_limits(limits)
-
-    def set_limits(self, limits: JointLimits) -> None:
-        """Brake by other limits from now on."""
-        self.limits = limits
-        self.blocks = pack(self.robot, (self.rules, limits, self.max_age), self.solids, self.groups)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what was measured."""
-        self._known = np.full(len(self.groups) * (1 + self.robot.nq), np.nan)
+        self.blocks = pack(robot, (rules, limits, max_age), self.solids, self.groups)
+        self._known = np.full(len(self.groups) * (1 + robot.nq), np.nan)  # nothing has been measured
 
     def __call__(self, q: Array, qd: Array, command: Array, points: Array, ages: Array) -> Gated:
         """Replace a command (n,) [rad/s] by what of it can be let through.

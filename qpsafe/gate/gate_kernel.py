@@ -13,12 +13,11 @@ from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.compiled.memory import view
 from qpsafe.gate import braking_path, people_kernel, solids_kernel, tables, workspace
+from qpsafe.gate.braking_path import slow_down
 from qpsafe.gate.people_kernel import measure_all, people_excess, place_axes, stand
 from qpsafe.gate.solids_kernel import touched
 from qpsafe.gate.tables import CAPSULES, DT, GROUPS, MAX_AGE, PAIRS, SHAPES
 from qpsafe.geometry import pairs as pairs_module
-from qpsafe.pipeline import braking
-from qpsafe.pipeline.braking import slow_down
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
 
@@ -31,7 +30,7 @@ SHARE, CAUSE, WHO, POINT, SHORT = range(5)
 TOLD = 5
 
 USES = (
-    reference_module, tables, workspace, braking_path, people_kernel, solids_kernel, braking, kinematics, pairs_module,
+    reference_module, tables, workspace, braking_path, people_kernel, solids_kernel, kinematics, pairs_module,
     *pairs_module.USES,
 )  # fmt: skip
 

@@ -8,9 +8,11 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.compiled.compiled import entry, inline, readable
+from qpsafe.compiled.compiled import entry, readable
 from qpsafe.danger.evasion import Evasion
 from qpsafe.errors import in_words
+from qpsafe.gate import braking_path
+from qpsafe.gate.braking_path import slow_down
 from qpsafe.limits import Box, JointLimits
 from qpsafe.pipeline.checks import reals
 
@@ -33,15 +35,7 @@ class Braked(NamedTuple):
     messages: tuple[str, ...]
 
 
-@inline
-def slow_down(qd: Array, acceleration: Array, dt: float, slower: Array) -> None:
-    """The velocity qd (n,) [rad/s] a tick later, braked as hard as allowed: inside the box."""
-    for j in range(qd.shape[0]):
-        most = acceleration[j] * dt
-        slower[j] = qd[j] - min(max(qd[j], -most), most)
-
-
-@entry(types.void(readable(1), readable(1), types.float64, types.float64[::1]))
+@entry(types.void(readable(1), readable(1), types.float64, types.float64[::1]), braking_path)
 def _slow_down(qd: Array, acceleration: Array, dt: float, slower: Array) -> None:
     slow_down(qd, acceleration, dt, slower)
 
