@@ -85,7 +85,7 @@ def _bound(
         if covered > way:
             way, ticks = covered, r.times[i]
     bound = min(highest(s, push, dt), speed + (s - way) / ((ticks + 1.0) * dt))
-    return bound, bound - speed - push
+    return max(bound, -RETURN_SPEED), bound - speed - push
 
 
 @inline
