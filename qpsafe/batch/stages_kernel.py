@@ -49,7 +49,7 @@ from qpsafe.tasks.joint import TURN
 
 _sense_readings = linked(sense_readings, kinematics, push, readings, *push.USES, *readings.USES)
 _sense_points = linked(sense_points, kinematics, push, detection, *push.USES)
-_resolve_tick = linked(resolve_tick, kinematics, clik, limits_module, damping, regimes, *MODULES)
+_resolve_tick = linked(resolve_tick, *resolve_kernel.USES)
 _clearance_rows = linked(clearance_rows, *clearance_kernel.USES)
 _filter_by = linked(filter_by)
 _parts, _given = inline(parts), inline(given)
@@ -59,7 +59,7 @@ _parts, _given = inline(parts), inline(given)
 USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
     limits_module, braking, resolve_kernel, sense_kernel, stall, steps, kinematics, speed_cap, units, clik, offset,
-    detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES,
+    detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
     regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 
@@ -148,7 +148,7 @@ def keep_clear(p: Any, s: Any, w: Any, memory: Array, limits: Array, dt: float) 
         count = _clearance_rows(
             memory, s.qd, limits, dt, p.solids, p.solids_whole, w.clearance, w.clearance_whole
         )  # fmt: skip
-    w.soft[0], w.soft[1] = min(count, 1), count
+    w.soft[0], w.soft[1], w.soft[2] = min(count, 1), count, count
     if count > 0:
         n = s.q.shape[0]
         rows = cut_rows(w.clearance, w.clearance_whole, n, p.solids_whole[2])

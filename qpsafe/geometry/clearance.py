@@ -33,23 +33,22 @@ class ClearanceLimit(Fixed):
     """Keeps the robot a margin away from known obstacles, from what it carries and from itself.
 
     A pair of points of two convex shapes at the distance d, with the normal n from one to the other, comes nearer by
-    nᵀ J q̇. It has two rows, with s = d - margin:
+    nᵀ J q̇. Its row is nᵀ J q̇ <= the lower of two bounds, with s = d - margin:
 
-        (1)  nᵀ J q̇ <= the exact discrete `stopping_speed` of s at the deceleration Σ_j |nᵀ J|_j a_j
-        (2)  Σ_j (nᵀ J)_j φ_j(q̇_j) <= s,   φ_j = `stopping_way`, linearised within what the tick can reach
+        (1)  the exact discrete `stopping_speed` of s at the deceleration Σ_j |nᵀ J|_j a_j
+        (2)  nᵀ J q̇_now + (s - w) / T,   w the farthest way along n while all joints brake, T the time until there
 
     (1) says that the pair can be stopped in time when all joints go against the row together. That alone promises
     nothing: a joint near its own limits cannot, and a robot that brakes does not, since each joint then stops at its
-    own a_j in its own time. (2) says that it stops in time when it brakes. With one joint in motion (2) is the
-    stricter one, with the deceleration |nᵀ J| a; without (1), retreat that braking will end could be traded for
-    approach now. See `clearance_kernel` for the lines.
+    own a_j in its own time. (2) says that it stops in time when it brakes: where w has reached s, nothing may be added.
+    With one joint in motion (2) is the stricter one, and that of the joint alone.
 
-    **What is promised**, with n and J held: whoever obeys the rows stays the margin away and, when he brakes at the
-    limits of all joints, ends there too; going against the row with every joint obeys both rows at the next tick, so
-    one pair is never in conflict with itself. **What is not**: n and J turn while the arm moves, joints that stop
-    earlier than others may lead nearer half-way, limits of position and velocity may keep a joint from going against
-    the row, rows of several pairs may conflict, and a tick has 16 rows at most, those with the least room. That is what
-    the gate looks at, along the whole braking motion.
+    **What is promised**, with n and J held: whoever obeys the row stays the margin away; and while the speeds of
+    approach that he adds come from joints that approach, braking at the limits of all joints never leads nearer, at
+    any of eight times until all stand. Braking obeys (2) at the next tick. **What is not**: n and J turn while the arm
+    moves; speed moved from one joint to another that brakes more slowly counts one tick later; limits of position and
+    velocity may keep a joint from going against the row; rows of several pairs may conflict; and a tick has 16 rows at
+    most, those with the least room. That is what the gate looks at, along the whole braking motion.
 
     Rows are soft, directly under the joint limits: a tick always has a solution. What is nearer than the margin is led
     away at 0.05 m/s. Pairs that cannot come nearer than the margin before the joints stand have no row, nor has a row

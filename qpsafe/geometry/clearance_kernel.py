@@ -1,18 +1,16 @@
 """Rows that keep shapes apart, compiled: which pairs could come too near before the joints can stand, and their rows.
 
-A point pair at the distance d with the normal n and the row g = nᵀ (J_a - J_b) comes nearer by g·q̇. Two rows keep
-s = d - margin from being used up. The first is about this tick and the next ones, as of a joint and its limit,
+A point pair at the distance d with the normal n and the row g = nᵀ (J_a - J_b) comes nearer by g·q̇. Its row is
+g·q̇ <= the lower of two bounds, with s = d - margin. The first is that of a joint and its position limit,
 
-    (1)  g·q̇ <= stopping_speed(s) at the deceleration Σ_j |g_j| a_j,
+    (1)  stopping_speed(s) at the deceleration Σ_j |g_j| a_j,
 
-which the joints have together if all go against the row. The second is about braking: one tick at q̇, then every joint
-brakes by a dt each tick, and joint j covers φ_j(q̇_j), the `stopping_way`, odd in q̇_j:
+which the joints have together if all go against the row. The second looks at the robot braking, each joint at its own
+limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from its velocity now, and the pair has come
+nearer by Σ_j g_j φ_j(m), most after m* ticks. A speed of approach that is higher by δ leads farther by (m* + 1) dt δ at
+most while the joints that give it brake, so
 
-    (2)  Σ_j g_j φ_j(q̇_j) <= s.
-
-Within what a tick can reach each term is bounded by a line, g_j φ_j(v) <= g_j m_j v + |g_j| c_j: of a joint that
-approaches the chord from its velocity after braking to that after accelerating (φ is convex there), of one that
-retreats the line through its velocity now and after braking. Both are exact where the joint brakes.
+    (2)  g·q̇_now + (s - max_m Σ_j g_j φ_j(m)) / ((m* + 1) dt).
 """
 
 from __future__ import annotations
@@ -42,6 +40,7 @@ from qpsafe.robot.kinematics import Index, cut, place
 
 TILT = 0.15  # how far the directions lean from the normal in which further points of a pair are looked for [rad]
 AROUND = 8  # how many directions
+SAME = 0.005  # of points nearer than that to the nearest one, none is a further one [m]
 CLOSE = 0.05  # a pair that is nearer has rows of further points [m]
 DEEP = 4  # pairs that overlap, whose depth takes long; where there are more, the rest has no rows in this tick
 RETURN_SPEED = 0.05  # of what is nearer than the margin, away from there [m/s]
@@ -52,33 +51,41 @@ USES = (limits_module, reference_module, clearance_work, nearness, reaches, *pai
 
 
 @inline
-def _row(t: Any, r: Any, twists: Array, qd: Array, a: int, b: int, p: Vector, o: Vector, n: Vector) -> None:
-    """Fill g = nᵀ (J_a(p) - J_b(o)), and of it: speed, largest change of speed in a tick, way at the worst velocity."""
-    speed, push, way = 0.0, 0.0, 0.0
-    for j in range(qd.shape[0]):
-        w, v = (twists[3, j], twists[4, j], twists[5, j]), (twists[0, j], twists[1, j], twists[2, j])
-        g = t.supports[a, j] * dot(n, add(v, 1.0, cross(w, p))) - t.supports[b, j] * dot(n, add(v, 1.0, cross(w, o)))
-        r.g[j] = g
-        k = 0 if g * qd[j] >= 0.0 else 2
-        speed += g * qd[j]
-        push += abs(g) * r.steps[j]
-        way += r.lines[k, j] * (g * qd[j] + abs(g) * r.steps[j]) + abs(g) * r.lines[k + 1, j]
-    r.facts[0], r.facts[1], r.facts[2] = speed, push, way
-
-
-@inline
-def _matters(r: Any, s: float, dt: float) -> bool:
-    """Whether one of the two rows of g can be broken in the next tick, s being the distance less the margin."""
-    speed, push, way = r.facts[0], r.facts[1], r.facts[2]
-    return way > s or speed + push > highest(s, push, dt)
-
-
-@inline
 def highest(s: float, push: float, dt: float) -> float:
     """Highest speed of approach at the distance s from the margin, of which push can be taken each tick [m/s]."""
     if s >= 0.0:
         return stopping_speed(s, push / dt, dt) if push > 0.0 else inf
     return -min(-s / dt, RETURN_SPEED)
+
+
+@inline
+def _bound(
+    t: Any, r: Any, twists: Array, qd: Array, a: int, b: int, p: Vector, o: Vector, n: Vector, s: float, dt: float
+) -> tuple[float, float]:
+    """Fill g = nᵀ (J_a(p) - J_b(o)); its upper bound, and how much of it the next tick leaves at worst [m/s].
+
+    What is left is positive, and no row is needed, too, where the way at full acceleration and then braking is no more
+    than s with all that goes the other way left out.
+    """
+    speed, push, most = 0.0, 0.0, 0.0
+    for j in range(qd.shape[0]):
+        w, v = (twists[3, j], twists[4, j], twists[5, j]), (twists[0, j], twists[1, j], twists[2, j])
+        g = t.supports[a, j] * dot(n, add(v, 1.0, cross(w, p))) - t.supports[b, j] * dot(n, add(v, 1.0, cross(w, o)))
+        r.g[j] = g
+        speed += g * qd[j]
+        push += abs(g) * r.steps[j]
+        most += abs(g) * (r.far[j] if g * qd[j] >= 0.0 else r.back[j])
+    if most <= s:
+        return inf, inf
+    way, ticks = -inf, 1.0
+    for i in range(r.times.shape[0]):
+        covered = 0.0
+        for j in range(qd.shape[0]):
+            covered += r.g[j] * r.ahead[i, j]
+        if covered > way:
+            way, ticks = covered, r.times[i]
+    bound = min(highest(s, push, dt), speed + (s - way) / ((ticks + 1.0) * dt))
+    return max(bound, -RETURN_SPEED), bound - speed - push
 
 
 @inline
@@ -103,32 +110,15 @@ def _take(
     t: Any, r: Any, twists: Array, qd: Array, pair: int, a: int, b: int, p: Vector, o: Vector, n: Vector, d: float,
     dt: float,
 ) -> None:  # fmt: skip
-    """Rows of the points p of body a and o of body b, with the normal n from p to o, those that can be broken."""
-    s = d - t.numbers[0]
-    _row(t, r, twists, qd, a, b, p, o, n)
-    speed, push, way = r.facts[0], r.facts[1], r.facts[2]
-    bound = highest(s, push, dt)
-    if speed + push > bound:  # (1)
-        at = _place(r, bound - speed - push)
-        if at >= 0:
-            r.high[at], r.gaps[at], r.which[at] = bound, d, pair
-            for j in range(qd.shape[0]):
-                r.A[at, j] = r.g[j]
-    if way > s:  # (2), divided by the mean of m_j so that it is a speed too
-        mean, total = 0.0, 0.0
+    """The row of the points p of body a and o of body b, with the normal n from p to o, if it can be broken."""
+    bound, left = _bound(t, r, twists, qd, a, b, p, o, n, d - t.numbers[0], dt)
+    if not left < 0.0:
+        return
+    at = _place(r, left)
+    if at >= 0:
+        r.high[at], r.gaps[at], r.which[at] = bound, d, pair
         for j in range(qd.shape[0]):
-            k = 0 if r.g[j] * qd[j] >= 0.0 else 2
-            mean += abs(r.g[j]) * r.lines[k, j]
-            total += abs(r.g[j])
-        mean /= total
-        at = _place(r, (s - way) / mean)
-        if at >= 0:
-            high = max(s, -RETURN_SPEED * dt)
-            for j in range(qd.shape[0]):
-                k = 0 if r.g[j] * qd[j] >= 0.0 else 2
-                r.A[at, j] = r.g[j] * r.lines[k, j] / mean
-                high -= abs(r.g[j]) * r.lines[k + 1, j]
-            r.high[at], r.gaps[at], r.which[at] = high / mean, d, pair
+            r.A[at, j] = r.g[j]
 
 
 @inline
@@ -188,10 +178,9 @@ def _further(
         # the other shape lies beyond the plane through its nearest point: no farther than that, and seldom nearer
         e = add(p, -1.0, c)
         deeper = dot(n, e)
-        if dot(e, e) < 1e-18:  # the nearest point itself
+        if dot(e, e) < SAME * SAME:
             continue
-        _row(t, r, twists, qd, a, b, c, c, n)
-        if not _matters(r, d + deeper - t.numbers[0], dt):
+        if not _bound(t, r, twists, qd, a, b, c, c, n, d + deeper - t.numbers[0], dt)[1] < 0.0:
             continue
         for q in range(12):
             A[q] = 1.0 if q == 0 or q == 5 or q == 10 else 0.0

@@ -29,6 +29,8 @@ class ClearanceLevel(Level):
 
     __slots__ = ("_names", "_pairs", "gaps")
 
+    firm = True
+
     def __init__(self, A: Array, upper: Array, gaps: Array, pairs: Index, names: tuple[str, ...]) -> None:
         # shapes are right: without the checks of `Level`, which take longer than the rows
         self.A, self.upper, self.weight = A, upper, None

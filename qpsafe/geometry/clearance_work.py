@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.compiled.compiled import Array, inline
 from qpsafe.compiled.memory import view
 from qpsafe.geometry.layout import FLOATS
+from qpsafe.geometry.reach import LOOKS
 from qpsafe.geometry.separation import WORK
 
 Index = NDArray[np.int64]
@@ -20,7 +21,8 @@ class Rows(NamedTuple):
     """What a tick's rows are made of, and the rows.
 
     Attributes:
-        lines: m and c of a joint that approaches, and of one that retreats (4, n).
+        ahead: Way of each joint when all brake, after some ticks, with its sign (LOOKS, n).
+        times: After how many (LOOKS,).
         far: Way of each joint that it can cover at most (n,).
         back: Likewise the other way than it goes now (n,).
         steps: a dt (n,) [rad/s].
@@ -34,7 +36,8 @@ class Rows(NamedTuple):
         marks: (2,) how many rows, and how many pairs overlap.
     """
 
-    lines: Array
+    ahead: Array
+    times: Array
     far: Array
     back: Array
     steps: Array
@@ -43,7 +46,6 @@ class Rows(NamedTuple):
     globes: Array
     pair: Array
     g: Array
-    facts: Array
     room: Array
     A: Array
     high: Array
@@ -61,13 +63,14 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
         n: Joints.
         g: Shapes.
     """
-    a = 4 * n
+    a = LOOKS * (n + 1)
     b = a + 3 * n + (n + 1) * n
     c = b + 3 * (n + 1) + 3 * g
     d = c + 2 * (24 + 12 + WORK + 7) + FLOATS
-    e = d + n + 3 + MOST
+    e = d + n + MOST
     return Rows(
-        view(floats, 0, (4, n)),
+        view(floats, 0, (LOOKS, n)),
+        view(floats, LOOKS * n, (LOOKS,)),
         view(floats, a, (n,)),
         view(floats, a + n, (n,)),
         view(floats, a + 2 * n, (n,)),
@@ -76,8 +79,7 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
         view(floats, b + 3 * (n + 1), (g, 3)),
         view(floats, c, (2 * (24 + 12 + WORK + 7) + FLOATS,)),
         view(floats, d, (n,)),
-        view(floats, d + n, (3,)),
-        view(floats, d + n + 3, (MOST,)),
+        view(floats, d + n, (MOST,)),
         view(floats, e, (MOST, n)),
         view(floats, e + MOST * n, (MOST,)),
         view(floats, e + MOST * (n + 1), (MOST,)),
@@ -88,7 +90,7 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
 
 def sizes_of(n: int, g: int) -> tuple[int, int]:
     """How many floats and integers these are, for n joints and g shapes."""
-    floats = 7 * n + (n + 1) * n + 3 * (n + 1) + 3 * g + 2 * (43 + WORK) + FLOATS + n + 3 + MOST * (n + 3)
+    floats = LOOKS * (n + 1) + 3 * n + (n + 1) * n + 3 * (n + 1) + 3 * g + 2 * (43 + WORK) + FLOATS + n + MOST * (n + 3)
     return floats, MOST + 2
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor, sqrt
+from math import ceil, floor, inf, sqrt
 from typing import Any
 
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, inline
@@ -10,33 +10,34 @@ from qpsafe.geometry.layout import BALL, BODY, PLANES, PLANES_FROM
 from qpsafe.geometry.nearness import FEW
 from qpsafe.robot.kinematics import place
 
+LOOKS = 8  # times at which the way of a braking robot is looked at, the last one when it stands
+
 
 @inline
-def stopping_way(v: float, a: float, dt: float) -> float:
-    """How far a speed v >= 0 leads that is held for one tick and then reduced by a dt each tick, to 0.
+def braking_way(v: float, a: float, dt: float, ticks: float) -> float:
+    """How far a speed v >= 0 leads in some ticks that is held for the first one and then reduced by a dt each tick.
 
-    The inverse of `stopping_speed`: dt Σ_{j=0..k} (v - j a dt) with k = floor(v/(a dt)). Convex in v, and v dt where v
-    is no more than a dt.
+    dt Σ_{j=0..m-1} (v - j a dt), m being the ticks, or those until it stands: k + 1 with k = floor(v/(a dt)). With all
+    of these it is the inverse of `stopping_speed`.
     """
-    k = floor(v / (a * dt))
-    return dt * ((k + 1.0) * v - 0.5 * a * dt * k * (k + 1.0))
+    m = min(ticks, floor(v / (a * dt)) + 1.0)
+    return dt * m * (v - 0.5 * a * dt * (m - 1.0))
 
 
 @inline
 def prepare(t: Any, r: Any, poses: Array, twists: Array, qd: Array, limits: Array, dt: float) -> None:
-    """Lines of the joints, how far each body can come until it stands, and balls."""
-    n = qd.shape[0]
+    """Ways of the joints that brake, how far each body can come until it stands, and balls."""
+    n, last = qd.shape[0], 1.0
     for j in range(n):
-        a = limits[3, j]
-        v, step = abs(qd[j]), a * dt
-        braked = max(v - step, 0.0)
-        now, after, most = stopping_way(v, a, dt), stopping_way(braked, a, dt), stopping_way(v + step, a, dt)
-        r.lines[0, j] = (most - after) / (v + step - braked)
-        r.lines[1, j] = after - r.lines[0, j] * braked
-        r.lines[2, j] = (now - after) / (v - braked) if v > braked else dt
-        r.lines[3, j] = r.lines[2, j] * braked - after
-        r.far[j], r.steps[j] = most, step
-        r.back[j] = max(step - v, 0.0) * dt
+        v, a = abs(qd[j]), limits[3, j]
+        r.steps[j] = step = a * dt
+        r.far[j], r.back[j] = braking_way(v + step, a, dt, inf), max(step - v, 0.0) * dt
+        last = max(last, floor(v / step) + 1.0)
+    for i in range(LOOKS):
+        r.times[i] = ceil((i + 1) * last / LOOKS)
+        for j in range(n):
+            way = braking_way(abs(qd[j]), limits[3, j], dt, r.times[i])
+            r.ahead[i, j] = way if qd[j] >= 0.0 else -way
     for b in range(1, n + 1):
         c = place(poses[b], t.balls[b, 0], t.balls[b, 1], t.balls[b, 2])
         r.balls[b, 0], r.balls[b, 1], r.balls[b, 2] = c

@@ -28,6 +28,9 @@ class Level:
 
     __slots__ = ("A", "lower", "upper", "weight")
 
+    #: Whether tasks of a controller below do not ask for what its upper bounds forbid, see `qpsafe.laws.yielding`.
+    firm = False
+
     A: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]

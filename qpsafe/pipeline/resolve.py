@@ -158,7 +158,8 @@ class Resolve:
         count = 0
         if soft:
             ours = ours and len(soft) <= MOST_SOFT and all(level.weight is None for level in soft)
-            count = sum(level.rows for level in soft) if ours and self._kind != NULLSPACE else 0
+            if self._kind != NULLSPACE and len(soft) <= MOST_SOFT:  # projections know no inequalities
+                count = sum(level.rows for level in soft)
         room = -(-count // _ROOM) * _ROOM
         made = self._layouts.get((room, *counts))
         if made is None:

@@ -19,7 +19,9 @@ from qpsafe.hqp.own.hierarchy import HEADER
 from qpsafe.hqp.own.regimes import solve_regimes
 from qpsafe.hqp.own.solver import MODULES
 from qpsafe.laws import damping as laws_damping
+from qpsafe.laws import yielding as laws_yielding
 from qpsafe.laws.damping import threshold_compiled
+from qpsafe.laws.yielding import yield_to
 from qpsafe.limits import admit_into, box_into
 from qpsafe.pipeline.checks import ABSURD_STEP
 from qpsafe.robot import kinematics
@@ -112,6 +114,8 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
 
 
 cut_parts, cut_given = inline(parts), inline(given)
+#: All the code that goes into `resolve_tick`.
+USES = (kinematics, clik, limits_module, laws_damping, laws_yielding, regimes, *MODULES)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
 _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.float64[::1], types.int64[::1]
 #: Of a `Layout`.
@@ -141,7 +145,7 @@ def sent(blend: Array, bounds: Array, codes: Index, info: Index, dt: float, comm
         types.float64, types.float64, types.float64,
         *layout_types, _out, _out_ints, _out,
     ),
-    kinematics, clik, limits_module, laws_damping, regimes, *MODULES,
+    *USES,
 )  # fmt: skip
 def resolve_tick(
     q: Array, qd: Array, memory: Array, supports: Array, k: int, bodies: Index, placements: Array, rows: Index,
@@ -180,6 +184,11 @@ def resolve_tick(
             pose_rows(
                 poses, axes, supports[bodies[t]], bodies[t], placements[t], rows[first:stop], gains[t], goals[t],
                 twists[t], A[first:stop], b[first:stop], e[first:stop],
+            )  # fmt: skip
+        if soft[2] > 0:
+            yield_to(
+                A[first:stop], b[first:stop], view(matrix, 0, (soft[2], n)), view(target, target.shape[1], (soft[2],)),
+                view(work, 0, (stop - first, stop - first + 1)),
             )  # fmt: skip
         square, near[t] = threshold_compiled(square, gains[t], e[first:stop], damping_time)
     near[tasks] = 0.0  # the level that closes the hierarchy has none

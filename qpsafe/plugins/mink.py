@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import mink
@@ -10,15 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.geometry.clearance import MARGIN
+from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, mujoco_joints
 from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, release
 from qpsafe.robot.robot import Robot
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
 
 Array = NDArray[np.float64]
 
-__all__ = ["ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask"]
+__all__ = ["ClearanceLimit", "ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask"]
 
 
 class EvasiveTask(EvasiveRows, mink.Task):  # type: ignore[misc]
@@ -130,6 +134,43 @@ class DangerLimit(DangerRows, mink.Limit):  # type: ignore[misc]
 
     def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
         """G Δq <= h, `mink.Constraint`; inactive without points."""
+        rows = self.rows(configuration, dt)
+        return mink.Constraint() if rows is None else mink.Constraint(*rows)
+
+
+class ClearanceLimit(ClearanceRows, mink.Limit):  # type: ignore[misc]
+    """Keeps the robot a margin away from known obstacles, from what it carries and from itself.
+
+    In place of mink's `CollisionAvoidanceLimit`: stopping in time within the acceleration limits, true distances of the
+    convex hulls, several points of a pair, and no row where nothing can come too near.
+
+    Args:
+        danger: What knows the robot's state and limits; update it before each `solve_ik`.
+        known: Obstacles that stand still, in the robot's own world frame.
+        carried: What tools carry, by the frame it is fixed to and in its axes.
+        margin: How near the robot may come [m].
+        prefix: What stands before the joints' names in the model.
+
+    Raises:
+        ConfigurationError: Names the argument that is wrong; at the first `solve_ik` also if its dt is another one.
+    """
+
+    def __init__(
+        self,
+        danger: DangerMonitor,
+        known: Sequence[Obstacle] = (),
+        carried: Carried | None = None,
+        margin: float = MARGIN,
+        prefix: str = "",
+    ) -> None:
+        self.set_up(danger, known, carried, margin, prefix)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the MuJoCo model."""
+        return mujoco_joints(model, self.robot, self.prefix)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
+        """G Δq <= h, `mink.Constraint`; inactive where nothing can come too near."""
         rows = self.rows(configuration, dt)
         return mink.Constraint() if rows is None else mink.Constraint(*rows)
 

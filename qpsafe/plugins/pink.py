@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.geometry.clearance import MARGIN
+from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, pinocchio_joints
 from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, release
 from qpsafe.robot.robot import Robot
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
 
 try:
+    from pink.barriers import Barrier as PinkBarrier
     from pink.limits import Limit as PinkLimit
     from pink.tasks import Task as PinkTask
 except ImportError as error:
@@ -22,7 +27,10 @@ except ImportError as error:
 
 Array = NDArray[np.float64]
 
-__all__ = ["ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask"]
+__all__ = [
+    "ClearanceBarrier", "ClearanceLimit", "ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit",
+    "ReleasableTask",
+]  # fmt: skip
 
 
 class EvasiveTask(EvasiveRows, PinkTask):  # type: ignore[misc]
@@ -136,6 +144,86 @@ class DangerLimit(DangerRows, PinkLimit):  # type: ignore[misc]
     def compute_qp_inequalities(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
         """G Δq <= h; None without points."""
         return self.rows(configuration, dt)
+
+
+class ClearanceLimit(ClearanceRows, PinkLimit):  # type: ignore[misc]
+    """Keeps the robot a margin away from known obstacles, from what it carries and from itself.
+
+    As `qpsafe.plugins.mink.ClearanceLimit`, with the same arguments; among pink's `limits`.
+
+    Args:
+        danger: What knows the robot's state and limits; update it before each `solve_ik`.
+        known: Obstacles that stand still, in the robot's own world frame.
+        carried: What tools carry, by the frame it is fixed to and in its axes.
+        margin: How near the robot may come [m].
+        prefix: What stands before the joints' names in the model.
+    """
+
+    def __init__(
+        self,
+        danger: DangerMonitor,
+        known: Sequence[Obstacle] = (),
+        carried: Carried | None = None,
+        margin: float = MARGIN,
+        prefix: str = "",
+    ) -> None:
+        self.set_up(danger, known, carried, margin, prefix)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
+        """G Δq <= h; None where nothing can come too near."""
+        return self.rows(configuration, dt)
+
+
+class ClearanceBarrier(ClearanceRows, PinkBarrier):  # type: ignore[misc]
+    """The same rows among pink's `barriers`; it adds nothing to the objective.
+
+    Args:
+        danger: What knows the robot's state and limits; update it before each `solve_ik`.
+        known: Obstacles that stand still, in the robot's own world frame.
+        carried: What tools carry, by the frame it is fixed to and in its axes.
+        margin: How near the robot may come [m].
+        prefix: What stands before the joints' names in the model.
+    """
+
+    def __init__(
+        self,
+        danger: DangerMonitor,
+        known: Sequence[Obstacle] = (),
+        carried: Carried | None = None,
+        margin: float = MARGIN,
+        prefix: str = "",
+    ) -> None:
+        self.set_up(danger, known, carried, margin, prefix)
+        super().__init__(dim=0)
+
+    def find_joints(self, model: Any) -> JointMap:
+        """By name in the pinocchio model."""
+        return pinocchio_joints(model, self.robot, self.prefix)
+
+    def compute_barrier(self, configuration: Any) -> Array:
+        """Distance less margin of each row (rows,) [m]."""
+        found = self.level(configuration, self.danger.dt)
+        return np.zeros(0) if found is None else found[0].gaps - self.clearance.margin
+
+    def compute_jacobian(self, configuration: Any) -> Array:
+        """Of these distances (rows, nv)."""
+        found = self.level(configuration, self.danger.dt)
+        A = np.zeros((0, self.robot.nq)) if found is None else found[0].A
+        return -self.joints(configuration).spread(A)
+
+    def compute_qp_objective(self, configuration: Any) -> tuple[Array, Array]:
+        """Nothing."""
+        nv = configuration.model.nv
+        return np.zeros((nv, nv)), np.zeros(nv)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float = 1e-3) -> tuple[Array, Array]:
+        """G Δq <= h."""
+        rows = self.rows(configuration, dt)
+        return (np.zeros((0, configuration.model.nv)), np.zeros(0)) if rows is None else rows
 
 
 class JointLimit(BoxRows, PinkLimit):  # type: ignore[misc]

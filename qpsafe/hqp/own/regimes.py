@@ -129,7 +129,7 @@ class Layout(NamedTuple):
         last: After the last row of each level.
         ends: Likewise of the tasks alone.
         near: Damping of each level.
-        soft: How many soft levels there are, and rows of them.
+        soft: How many soft levels there are, rows of them, and how many of these, the first ones, tasks give way to.
     """
 
     floats: Array
@@ -144,14 +144,15 @@ class Layout(NamedTuple):
 
     def fill(self, levels: Sequence[Level]) -> None:
         """Write down the soft levels, of which there is room for `MOST_SOFT`."""
-        first = 0
+        first = firm = 0
         for k, level in enumerate(levels):
             stop = first + level.rows
+            firm = stop if level.firm and firm == first else firm
             self.matrix[first:stop], self.target[0, first:stop], self.target[1, first:stop] = (
                 level.A, level.lower, level.upper,
             )  # fmt: skip
             first = self.last[k] = stop
-        self.soft[0], self.soft[1] = len(levels), first
+        self.soft[0], self.soft[1], self.soft[2] = len(levels), first, firm
 
 
 #: How many layouts are kept.
@@ -180,7 +181,7 @@ def layout_for(n: int, counts: Sequence[int], one: bool = False, room: int = 0) 
     layout = Layout(
         *workspace(n, rows, max(m, room)), m, np.empty((rows, n)), np.empty((2, rows)),
         np.empty(levels, dtype=np.int64), np.cumsum(counts, dtype=np.int64), np.empty(levels),
-        np.zeros(2, dtype=np.int64),
+        np.zeros(3, dtype=np.int64),
     )  # fmt: skip
     _layouts[(one, room, n, *counts)] = layout
     return layout

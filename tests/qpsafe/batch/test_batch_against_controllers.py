@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.moves import Dwell, Line
 from qpsafe.tasks.program import Program
 from qpsafe.tasks.rotation import exp3
@@ -210,3 +211,27 @@ def test_a_way_back_that_limits_block_goes_through_the_joints(pairs: Any, irb140
         led = [much + (loop.controllers[r].recovery.way is not None) for r, much in enumerate(led)]
     assert min(led) > 200
     assert [controller.recovery.phase for controller in loop.controllers] == ["following"] * 2
+
+
+@pytest.mark.parametrize(("name", "law"), [
+    ("irb140", None), ("irb14000", None), ("iiwa14", qpsafe.HierarchicalLaw("paper")), ("irb140", qpsafe.WeightedLaw()),
+])  # fmt: skip
+def test_rows_that_keep_clear_give_the_same_bits(pairs: Any, come: Any, name: str, law: Any) -> None:
+    """Goals below a table, people who push the arm at it, and ways back over it."""
+    robot = qpsafe.load_robot(name)
+    tools, tip = len(robot.tool_frames), robot.pose(robot.tool_frames[0], robot.home)[:3, 3]
+    table = Obstacle.box("table", (0.6, 0.5, 0.04), tip + np.array((0.0, 0.0, -0.12)))
+    goals = {frame: qpsafe.FixedPose(shifted(robot.pose(frame, robot.home), (0.0, 0.0, -0.2)))
+             for frame in robot.tool_frames}  # fmt: skip
+    tasks = [
+        kind(frame, goal) for kind in (qpsafe.PositionTask, qpsafe.OrientationTask) for frame, goal in goals.items()
+    ]
+    activation = qpsafe.robot_activation(robot, tools, tools) if tools > 1 else None
+    loop = pairs(lambda: qpsafe.SafetyController(robot, tasks, law, known=[table], activation=activation), 3)
+    points, rows = come(robot, 3, 350), 0
+    for k in range(350):
+        loop.step(lambda r, k=k: {"points": points[r][k]})
+        rows += any(limit.level(robot.at(q), qd, controller.limits) is not None for q, qd, controller, limit in
+                    ((loop.q[r], loop.qd[r], c, c.clearance) for r, c in enumerate(loop.controllers)))  # fmt: skip
+    assert loop.batch.compiled
+    assert rows > 20
