@@ -93,7 +93,7 @@ def _any_pending(s: Any) -> bool:
 @inline
 def on_path(s: Any) -> bool:
     """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
-    return s.marks[code.PHASE] == SUSPENDED or not _any_pending(s)
+    return not _any_pending(s)
 
 
 @inline

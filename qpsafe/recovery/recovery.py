@@ -204,7 +204,7 @@ class Recovery:
     @property
     def on_path(self) -> bool:
         """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
-        return self.phase == SUSPENDED or True not in self._pending
+        return True not in self._pending
 
     def due_events(self) -> tuple[str, ...]:
         """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""

@@ -3,10 +3,12 @@
 The paper takes obstacles as standing still, as `SensingRules(velocities=False)` does. A ray that sweeps over a surface
 tells nothing of motion along the surface, so only the part along the ray is estimated, and only an approach is passed
 on: a point that goes away is no reason to count less danger. Of an approach what is above `STILL` is passed on, so that
-noise before something at rest is none, and there is no step.
+noise before something at rest is none, and above what a ray that sweeps over a slope may show; there is no step.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 import numpy as np
 
@@ -33,8 +35,8 @@ class ApproachVelocity(Fixed):
         self.alpha = min(dt / time_constant, 1.0)
         self.beta = self.alpha**2 / (2.0 - self.alpha)
         self.fastest = fastest
-        #: Columns: last reading, NaN for none; z - x; v, negative where it comes nearer; the spot's place.
-        self.track = np.empty((count, 6))
+        #: Columns: last reading, NaN for none; z - x; v, negative where it comes nearer; the spot's place, direction.
+        self.track = np.empty((count, 9))
         self.reset()
 
     def reset(self) -> None:
@@ -48,6 +50,8 @@ _JUMP = 12.5
 #: So much of an approach may be noise and does not count: before something at rest the estimates of twenty noisy Sharp
 #: sensors stay below 0.04 m/s at 0.5 m and 0.09 m/s at the end of their range [m/s].
 STILL = 0.1
+#: A ray that sweeps over a slope reads it nearer and nearer; up to this slope that is no approach.
+SLOPE = 1.0
 
 
 @inline
@@ -72,10 +76,14 @@ def approach(
         origin, direction: Of the spot now.
         dt, alpha, beta, fastest, track: As in `ApproachVelocity`.
     """  # fmt: skip
-    change = d - track[i, 0]
+    along, aside = 0.0, 0.0
     for j in range(3):
-        change += direction[j] * (origin[j] - track[i, 3 + j])
-        track[i, 3 + j] = origin[j]
+        along += direction[j] * (origin[j] - track[i, 3 + j])
+    for j in range(3):  # how the ray's own motion moves the point: along the ray, and aside
+        moved = origin[j] - track[i, 3 + j] + d * (direction[j] - track[i, 6 + j]) - along * direction[j]
+        aside += moved * moved
+        track[i, 3 + j], track[i, 6 + j] = origin[j], direction[j]
+    change = d - track[i, 0] + along
     if fresh and abs(change) < _JUMP * dt:  # NaN fails: no reading before
         r = track[i, 1] + change - track[i, 2] * dt
         track[i, 1] = (1.0 - alpha) * r
@@ -83,4 +91,6 @@ def approach(
     else:
         track[i, 1] = track[i, 2] = 0.0
     track[i, 0] = d if fresh else np.nan
-    return max(min(track[i, 2] + STILL, 0.0), -fastest)
+    if not fresh:
+        return 0.0
+    return max(min(track[i, 2] + STILL + SLOPE * sqrt(aside) / dt, 0.0), -fastest)

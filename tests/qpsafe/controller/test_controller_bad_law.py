@@ -88,7 +88,7 @@ def test_a_faulty_law_is_reported_and_the_robot_brakes(run: Any, key: str, limit
 def test_the_path_waits_for_a_robot_that_a_fault_holds(run: Any) -> None:
     """Both on the path and on the way back to it; else the robot would have to catch up with a reference far ahead."""
     law = Law(raising(RuntimeError()))
-    loop = run(law)
+    loop = run(law, recovery=qpsafe.RecoveryRules(dwell=0.0))
     for _ in range(5):
         loop.step()
     for phase in ("following", "recovering"):

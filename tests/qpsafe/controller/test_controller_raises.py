@@ -135,7 +135,7 @@ def armed_loop(run: Any, robot: Any, fuse: Fuse, parts: frozenset[str]) -> Any:
         evasion=kind("evasion", qpsafe.Evasion)(4.0, 20.0, robot.nq),
         limits=kind("limits", qpsafe.JointLimits)(*limits),
         barrier=kind("barrier", qpsafe.DangerBarrier)(30.0, field=field) if "barrier" in parts else None,
-        recovery=kind("recovery", RecoveryRules)(shortest=0.02, ramp=0.02, tolerance=0.05),
+        recovery=kind("recovery", RecoveryRules)(shortest=0.02, ramp=0.02, tolerance=0.05, calm=1.0, dwell=0.0),
     )
     fuse.names.clear()
     return loop

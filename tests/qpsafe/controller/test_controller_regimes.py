@@ -10,6 +10,7 @@ import pytest
 import qpsafe
 
 FRONT, SIDE, ABOVE, BELOW = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, -1.0]
+PAPER = {"evasion": "paper", "recovery": qpsafe.RecoveryRules.paper()}  # task and evasion balance in high danger
 LAWS = {
     "strict": qpsafe.HierarchicalLaw(),
     "paper": qpsafe.HierarchicalLaw("paper"),
@@ -127,7 +128,7 @@ def test_medium_danger_turns_the_tool_and_leaves_it_where_it_is(
 def test_high_danger_drives_the_robot_away_and_afterwards_it_comes_back(
     run: Any, irb140: Any, law: Any, direction: list[float]
 ) -> None:
-    loop, point = run(law), point_of_danger(irb140, 15.0, direction)
+    loop, point = run(law, **PAPER), point_of_danger(irb140, 15.0, direction)
     stays = distance_to_wire(irb140, irb140.home, point)
     phases = ["following"]
     for _ in range(250):
@@ -157,10 +158,29 @@ def test_high_danger_drives_the_robot_away_and_afterwards_it_comes_back(
     ]
 
 
+@pytest.mark.parametrize("direction", [FRONT, SIDE, ABOVE])
+def test_by_default_it_gets_out_of_high_danger_and_waits_there(run: Any, irb140: Any, direction: list[float]) -> None:
+    """Farther than the paper's balance, which is in high danger; and back as soon as nobody is there for a while."""
+    point, gaps = point_of_danger(irb140, 15.0, direction), []
+    for parts in (PAPER, {}):
+        loop = run(**parts)
+        ticks = [loop.step([point]) for _ in range(500)]
+        gaps.append(distance_to_wire(irb140, loop.q, point))
+        assert {tick.phase for tick in ticks} == {"suspended"}
+    assert gaps[1] > gaps[0]
+    assert ticks[-1].regime == "medium"
+    assert np.abs(ticks[-1].reference.qd).max() < 0.2
+    assert np.linalg.norm(ticks[-1].errors[0]) > 0.05  # of the path, not of what holds it
+    phases = [loop.step().phase for _ in range(2500)]
+    assert phases[:70] == ["suspended"] * 70
+    assert phases[-1] == "following"
+    assert np.linalg.norm(loop.step().errors[0]) < 1e-3
+
+
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_regimes_and_phases_follow_each_other_as_drawn(run: Any, law: Any) -> None:
     """An obstacle comes at 0.8 m/s, waits, and leaves: levels of danger are passed one by one, there and back."""
-    loop = run(law)
+    loop = run(law, **PAPER)
     tip = loop.robot.pose("tcp", loop.robot.home)[:3, 3]
     regimes, phases, path_time = ["low"], ["following"], 0.0
     gaps = np.concatenate(

@@ -1,5 +1,6 @@
 """On the way back the joints use a share of their acceleration, unless a position limit asks for more."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ def test_accelerations_stay_under_their_share_whatever_danger_does(
     run: Any, irb140: Any, key: str, share: float
 ) -> None:
     """People who come and go at once, so that danger jumps while the robot is on its way back, too."""
-    loop = run(LAWS[key](), recovery=RecoveryRules(acceleration=share))
+    loop = run(LAWS[key](), recovery=replace(RecoveryRules.paper(), acceleration=share))
     rng, dt, largest, hardest = np.random.default_rng(3), loop.controller.dt, 0.0, 0.0
     tip = irb140.pose("tcp", irb140.home)[:3, 3]
     points: np.ndarray = np.zeros((0, 3))

@@ -32,11 +32,14 @@ def drive(controller: Any, first: int, last: int, q: Any, qd: Any, way: Any = la
     return ticks
 
 
+PAPER: Any = {"evasion": "paper", "recovery": qpsafe.RecoveryRules.paper()}  # it is soon on its way back
+
+
 def made(robot: Any, law: Any, way: Any = lambda thing: thing) -> Any:
     here = qpsafe.FixedPose(way(robot.pose("tcp", robot.home)))
     tasks = [qpsafe.PositionTask("tcp", here), qpsafe.OrientationTask("tcp", here)]
     limits = qpsafe.JointLimits(*map(way, (robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration)))
-    return qpsafe.SafetyController(robot, tasks, law, limits=limits, barrier=qpsafe.DangerBarrier(10.5))
+    return qpsafe.SafetyController(robot, tasks, law, limits=limits, barrier=qpsafe.DangerBarrier(10.5), **PAPER)
 
 
 def same(ones: list[Any], others: list[Any]) -> None:

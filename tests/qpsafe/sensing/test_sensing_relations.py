@@ -12,6 +12,7 @@ import qpsafe
 from qpsafe.danger.evasion import link_vectors, virtual_torque
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.velocity import STILL
 
 RULES = SensingRules(self_detection=False)
 FIELD = qpsafe.DangerField()
@@ -147,7 +148,7 @@ def test_an_approaching_hand_is_more_dangerous_with_the_velocity_estimate_a_leav
             d[19] = 0.5 + speed * 0.004 * k
             what = sensing.update(irb140.at(q), irb140.wire(q, rest), d)
         _, directions = spots.rays(irb140.at(q))
-        expected = min(speed, 0.0) * directions[19]
+        expected = min(speed + STILL, 0.0) * directions[19]
         assert what.velocities[0] == pytest.approx(expected, abs=0.01)
         still, moving = (float(FIELD.value(what.points, irb140.wire(q, rest), v)[0]) for v in (None, what.velocities))
         assert moving > 1.2 * still if speed < 0.0 else moving == pytest.approx(still, abs=1e-9)
@@ -166,6 +167,26 @@ def test_the_robots_own_motion_is_no_approach(irb140: Any, by_hand: Any) -> None
         seen_now = sensing.update(state, state.wire(np.zeros(6)), d)
     assert d[19] < 0.62
     assert np.linalg.norm(seen_now.velocities[0]) < 0.02
+
+
+@pytest.mark.parametrize("slope", [-0.9, -0.4, 0.4, 0.9])
+@pytest.mark.parametrize("turn", [-0.6, 0.6])
+def test_a_slope_that_a_ray_sweeps_over_does_not_come(irb140: Any, by_hand: Any, slope: float, turn: float) -> None:
+    """The base turns, and with it the ray over a standing wall that is not square to it: not an approach, ever."""
+    sensing, found = DistanceSensing(irb140, by_hand, 0.004, SensingRules(velocities=True)), 0
+    for k in range(150):
+        q = irb140.home + turn * 0.004 * (k - 75) * np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        state = irb140.at(q)
+        origins, directions = sensing.spots.rays(state)
+        d, (x, y, _), (dx, dy, _) = np.full(20, np.inf), origins[19], directions[19]
+        d[19] = (1.1 + slope * y - x) / (dx - slope * dy)  # x = 1.1 + slope y
+        what = sensing.update(state, state.wire(np.zeros(6)), d)
+        if len(what.points):
+            found += 1
+            assert np.isfinite(what.velocities).all()  # from the first sight on
+            if abs(slope + dy / dx) < 0.9 * abs(1.0 - slope * dy / dx):  # up to 45° against the ray
+                assert not what.velocities.any()
+    assert found > 50
 
 
 ROTATION = "[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]"
