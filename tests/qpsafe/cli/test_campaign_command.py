@@ -416,6 +416,7 @@ def test_the_limits_of_a_folder_go_into_its_report(monkeypatch: pytest.MonkeyPat
     assert '"limits": {' in (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("_plain_page")
 def test_ctrl_c_says_that_limits_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     def stops(*_: Any) -> Limit:
         raise KeyboardInterrupt
