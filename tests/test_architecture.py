@@ -23,7 +23,7 @@ hqp.solve danger
 sensing
 geometry
 laws recovery
-pipeline
+pipeline gate
 tick
 controller
 batch
