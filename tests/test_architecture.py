@@ -24,7 +24,7 @@ sensing
 geometry
 gate
 laws recovery
-pipeline
+pipeline gate
 tick
 controller
 batch

@@ -38,6 +38,8 @@ class SeparationLevel(Level):
     """The rows of one tick, an inequality level.
 
     Attributes:
+        A: nᵀ J of each row (rows, n).
+        upper: v_max of each (rows,) [m/s].
         names: Of the links' parts, one a row.
         points: Number of the seen point of each row (rows,).
         gaps: Its distance to that part (rows,) [m].
