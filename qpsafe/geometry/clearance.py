@@ -61,7 +61,7 @@ class ClearanceLimit(Fixed):
     Args:
         robot: The robot.
         solids: It, what it carries and known obstacles.
-        margin: How near they may come [m], >= 0.
+        margin: How near they may come [m], >= 0; half as near as at home where that is less.
 
     Raises:
         ConfigurationError: The margin is no such number, or the solids are of another robot.

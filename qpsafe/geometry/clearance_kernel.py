@@ -111,7 +111,7 @@ def _take(
     dt: float,
 ) -> None:  # fmt: skip
     """The row of the points p of body a and o of body b, with the normal n from p to o, if it can be broken."""
-    bound, left = _bound(t, r, twists, qd, a, b, p, o, n, d - t.numbers[0], dt)
+    bound, left = _bound(t, r, twists, qd, a, b, p, o, n, d - t.margins[pair], dt)
     if not left < 0.0:
         return
     at = _place(r, left)
@@ -180,7 +180,7 @@ def _further(
         deeper = dot(n, e)
         if dot(e, e) < SAME * SAME:
             continue
-        if not _bound(t, r, twists, qd, a, b, c, c, n, d + deeper - t.numbers[0], dt)[1] < 0.0:
+        if not _bound(t, r, twists, qd, a, b, c, c, n, d + deeper - t.margins[pair], dt)[1] < 0.0:
             continue
         for q in range(12):
             A[q] = 1.0 if q == 0 or q == 5 or q == 10 else 0.0
@@ -220,7 +220,7 @@ def _pair_rows(t: Any, r: Any, poses: Array, twists: Array, qd: Array, pair: int
     n = _normal(p, o, d, along)
     a, b = t.index[i, BODY], t.index[j, BODY]
     size = max(t.shapes[i, BALL + 3], t.shapes[j, BALL + 3])
-    if d - t.numbers[0] > along_normal(t, r, twists, qd, a, b, row(r.globes, i), row(r.globes, j), size, n):
+    if d - t.margins[pair] > along_normal(t, r, twists, qd, a, b, row(r.globes, i), row(r.globes, j), size, n):
         return
     _take(t, r, twists, qd, pair, a, b, p, o, n, d, dt)
     if not 0.0 < d < CLOSE:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from qpsafe.compiled.compiled import Vector, inline
 from qpsafe.compiled.memory import view
 from qpsafe.geometry.layout import BALL, BODY, CASE, FLOATS, INTEGERS, PLANES, PLANES_FROM
+from qpsafe.geometry.measure import nearest_of, pairs_of
 from qpsafe.geometry.pairs import pose_of
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ class Tables(NamedTuple):
     """The solids: n joints, g shapes, m pairs in groups of the same two bodies.
 
     Attributes:
-        numbers: The margin [m] (1,).
+        numbers: The largest margin [m] (1,).
+        margins: Of the pairs [m] (m,).
         balls: Around the shapes of each body, centre in its frame and radius (n + 1, 4); radius -1 for none.
         supports: 1 where joint j moves body i (n + 1, n).
         shapes, vertices, planes, index, starts, neighbours: As in `Solids`.
@@ -40,6 +42,7 @@ class Tables(NamedTuple):
     """
 
     numbers: Any
+    margins: Any
     balls: Any
     supports: Any
     shapes: Any
@@ -56,7 +59,7 @@ def tables_of(floats: Any, integers: Any) -> Tables:
     """Cut `Tables` from two blocks."""
     n, g, G, m = integers[0], integers[2], integers[3], integers[4]
     v, e, p = integers[5], integers[6], integers[7]
-    a = 1 + 4 * (n + 1)
+    a = 1 + m + 4 * (n + 1)
     b = a + (n + 1) * n
     c = b + FLOATS * g
     x = _HEAD + 5 * G
@@ -64,7 +67,8 @@ def tables_of(floats: Any, integers: Any) -> Tables:
     z = y + INTEGERS * g
     return Tables(
         view(floats, 0, (1,)),
-        view(floats, 1, (n + 1, 4)),
+        view(floats, 1, (m,)),
+        view(floats, 1 + m, (n + 1, 4)),
         view(floats, a, (n + 1, n)),
         view(floats, b, (g, FLOATS)),
         view(floats, c, (v, 3)),
@@ -81,7 +85,7 @@ cut_tables = inline(tables_of)
 
 
 def blocks_of(solids: Solids, robot: Robot, pairs: Index, margin: float) -> tuple[Array, Index]:
-    """The two blocks, read-only.
+    """The two blocks, read-only. A pair that is near at home already may come half as near as there.
 
     Args:
         solids: The solids.
@@ -102,11 +106,15 @@ def blocks_of(solids: Solids, robot: Robot, pairs: Index, margin: float) -> tupl
         count = len(list(members))
         groups.append((a, b, first, count, shape))
         first += count
+    poses, margins = robot.at(robot.home).body_poses(), np.full(len(pairs), margin)
+    for k, pair in enumerate(ordered):
+        at_home = nearest_of(solids.solid, poses, pairs_of([pair]), 2.0 * margin).distance
+        margins[k] = min(margin, max(0.5 * at_home, 0.0))
     balls = np.zeros((n + 1, 4))
     for body in range(n + 1):
         chosen = solids.shapes[(bodies == body) & ~known, BALL:]
         balls[body] = _ball_around(chosen)
-    floats = (np.array((margin,)), balls, robot.tree.supports, solids.shapes, solids.vertices, solids.planes)
+    floats = (np.array((margin,)), margins, balls, robot.tree.supports, solids.shapes, solids.vertices, solids.planes)
     counts = (
         n, robot.ends, len(bodies), len(groups), len(pairs), len(solids.vertices), len(solids.neighbours),
         len(solids.planes),

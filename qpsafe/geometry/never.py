@@ -64,7 +64,7 @@ def _apart(solids: Solids, robot: Robot, pair: tuple[int, int], margin: float) -
     joints = np.flatnonzero(tree.supports[a] != tree.supports[b])
     if len(joints) > MOST_JOINTS:
         return False
-    slides = np.abs(tree.axes[:, :3]).any(axis=1)
+    slides = np.asarray(np.abs(tree.axes[:, :3]).any(axis=1))
     turns = ~slides & ~(np.isfinite(robot.lower) & np.isfinite(robot.upper))
     low, high = (
         np.where(turns, -np.pi, robot.lower - BEYOND)[joints],
@@ -72,7 +72,7 @@ def _apart(solids: Solids, robot: Robot, pair: tuple[int, int], margin: float) -
     )
     if not (np.isfinite(low) & np.isfinite(high)).all():
         return False
-    levers = np.array([_lever(solids, robot, pair, j, slides) for j in joints])
+    levers = np.array([_lever(solids, robot, pair, j, slides) for j in joints.tolist()])
     work = np.empty(43 + WORK + 2 * MOST_JOINTS * _DEPTH + robot.nq)
     return bool(
         _never(robot.home, *tree, joints, levers, low, high, *pair, *solids.solid, margin, np.empty(robot.memory), work)

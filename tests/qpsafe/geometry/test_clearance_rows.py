@@ -168,3 +168,13 @@ def test_a_margin_that_is_none_is_refused(made: Any, margin: Any) -> None:
         ClearanceLimit(robot, solids, margin=margin)
     with pytest.raises(qpsafe.ConfigurationError, match="solids"):
         ClearanceLimit(robot, [FLOOR])  # type: ignore[arg-type]
+
+
+def test_what_is_near_at_home_may_come_half_as_near(made: Any) -> None:
+    """Two links 10 to 33 mm apart at home, and a margin of 50 mm: the robot at home is left alone."""
+    robot, solids = made
+    limit = ClearanceLimit(robot, solids, margin=0.05)
+    home = nearest_of(solids.solid, robot.at(robot.home).body_poses(), solids.own).distance
+    assert home < 0.05
+    level = limit.level(robot.at(robot.home), np.zeros(robot.nq), JointLimits.of(robot))
+    assert level is None or (level.upper >= 0.0).all()
