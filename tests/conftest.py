@@ -31,6 +31,7 @@ LONGEST = (
     "test_campaign_command.py",
     "test_fixed_experiment.py",
     "test_path_experiment.py",
+    "test_check.py",
     "test_pick_place.py",
 )
 

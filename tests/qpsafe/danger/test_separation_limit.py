@@ -249,3 +249,18 @@ def test_mistakes_are_named():
         SeparationLimit(2.0)  # type: ignore[arg-type]
     with pytest.raises(ConfigurationError, match="separation"):
         qpsafe.SafetyController(ROBOT, [qpsafe.PositionTask("tcp", qpsafe.FixedPose(np.eye(4)))], separation=1.6)
+
+
+def test_a_batch_keeps_links_apart_as_single_controllers_do():
+    """It says that it is not compiled, and gives the same references."""
+    controller = controller_with(ROBOT)
+    batch = qpsafe.BatchController(controller, 2)
+    assert not batch.compiled
+    assert "separation" in batch.why
+    point = ROBOT.pose("tcp", ROBOT.home)[:3, 3] + [0.2, 0.0, 0.0]
+    q, qd = np.tile(ROBOT.home, (2, 1)), np.zeros((2, 6))
+    for _ in range(10):
+        ticks = batch.step(q, qd, points=np.tile(point, (2, 1, 1)))
+        tick = controller.step(q[0], qd[0], points=[point])
+        q, qd = ticks.q, ticks.qd
+        assert (ticks.qd == tick.reference.qd).all()
