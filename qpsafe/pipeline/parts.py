@@ -182,16 +182,16 @@ class Parts:
         """Figures of the last step, which verifies the command; it is off without limits too."""
         return "off" if self._gate is None else self._gate
 
+    @gate.setter
+    def gate(self, gate: VerifiedMotion | str | None) -> None:
+        self._gate = checked_gate(gate)
+
     @property
     def verifies(self) -> Gate | None:
         """What verifies commands now, with its tables; None where that is off."""
         if self._gate is None or self._limits is None:
             return None
         return self._stages.gate(self._gate, self._braking)
-
-    @gate.setter
-    def gate(self, gate: VerifiedMotion | str | None) -> None:
-        self._gate = checked_gate(gate)
 
     @property
     def clearance(self) -> ClearanceLimit | Literal["off"]:

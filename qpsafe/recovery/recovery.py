@@ -73,17 +73,14 @@ class Recovery:
     def __init__(
         self, tasks: Sequence[Task], suspend_above: float, dt: float, rules: RecoveryRules | None = None
     ) -> None:
-        self._dt = dt
-        self._rules = RecoveryRules() if rules is None else rules
+        self._dt, self._rules = dt, RecoveryRules() if rules is None else rules
         self._enter(steps.FOLLOWING)
         self._step = dt / self.rules.ramp  # of the clock's rate, from tick to tick
         self._kept = math.exp(-dt / self.rules.fade)
-        self.path_time = 0.0
-        self.paused = False
+        self.path_time, self.paused = 0.0, False
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
         self.waits_for: tuple[str, ...] = ()
-        self._rate = 1.0  # of the clock
-        self._quiet = 0.0  # for how long danger has been small [s]
+        self._rate, self._quiet = 1.0, 0.0  # of the clock; for how long danger has been small [s]
         self._changed = self._led = False
         self._way: Recovery | None = None
         self._cursors: list[Cursor] = []
@@ -109,9 +106,7 @@ class Recovery:
             if hasattr(trajectory, "event")
         ]
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
-        self.tasks = tuple(tasks)
-        self.suspend_above = suspend_above
-        self._way = None
+        self.tasks, self.suspend_above, self._way = tuple(tasks), suspend_above, None
         self._returns: list[Return | None] = [None] * len(self.tasks)
         self._pending = [self.phase != FOLLOWING] * len(self.tasks)
         self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick

@@ -13,7 +13,7 @@ from qpsafe.sim.campaign.closest import PairsAlong
 from qpsafe.sim.campaign.limit.people_along import PeopleAlong
 from qpsafe.sim.campaign.limit.rollout import roll_out
 from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.engine.layout import BODY
+from qpsafe.geometry.layout import BODY
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.recording import Recording

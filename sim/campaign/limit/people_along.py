@@ -17,7 +17,7 @@ from qpsafe.robot.kinematics import Index, cut, forward
 from qpsafe.sim.campaign.closest import ways_of
 from qpsafe.sim.engine import nearest
 from qpsafe.sim.engine.nearest import PAIR, robot_to_people
-from qpsafe.sim.engine.separation import hull_types
+from qpsafe.geometry.separation import hull_types
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.station import Station
