@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.geometry.layout import BODY
 from qpsafe.limits import JointLimits
 from qpsafe.sim.campaign.closest import PairsAlong
 from qpsafe.sim.campaign.limit.people_along import PeopleAlong
 from qpsafe.sim.campaign.limit.rollout import roll_out
 from qpsafe.sim.campaign.servo import DT
-from qpsafe.geometry.layout import BODY
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.recording import Recording

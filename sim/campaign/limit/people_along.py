@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import entry, linked
 from qpsafe.compiled.memory import view
+from qpsafe.geometry.separation import hull_types
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward
 from qpsafe.sim.campaign.closest import ways_of
 from qpsafe.sim.engine import nearest
 from qpsafe.sim.engine.nearest import PAIR, robot_to_people
-from qpsafe.geometry.separation import hull_types
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.station import Station
