@@ -43,7 +43,7 @@ class ClearanceLimit(Fixed):
     own a_j in its own time. (2) says that it stops in time when it brakes: where w has reached s, nothing may be added.
     With one joint in motion (2) is the stricter one, and that of the joint alone.
 
-    Both take into account, to second order, that points move on bent ways while joints turn (`qpsafe.geometry.reach.bending`).
+    Both see, to second order, that points move on bent ways while joints turn (`qpsafe.geometry.reach.bending`).
 
     **What is promised**, with n held: whoever obeys the row stays the margin away; and while the speeds of approach
     that he adds come from joints that approach, braking at the limits of all joints never leads nearer, at any of

@@ -5,10 +5,10 @@ g·q̇ <= the lower of two bounds, with s = d - margin. The first is that of a j
 
     (1)  stopping_speed(s) at the deceleration Σ_j |g_j| a_j,
 
-which the joints have together if all go against the row, less what `bending` takes of it. The second looks at the robot braking, each joint at its own
-limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from its velocity now, and the pair has come
-nearer by w = Σ_j g_j φ_j(m) + `bending`, most after m* ticks. A speed of approach that is higher by δ leads farther by
-(m* + 1) dt δ at most while the joints that give it brake, so
+which the joints have together if all go against the row, less what `bending` takes of it. The second looks at the
+robot braking, each joint at its own limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from
+its velocity now, and the pair has come nearer by w = Σ_j g_j φ_j(m) + `bending`, most after m* ticks. A speed of
+approach that is higher by δ leads farther by (m* + 1) dt δ at most while the joints that give it brake, so
 
     (2)  g·q̇_now + (s - max_m w) / ((m* + 1) dt).
 """
