@@ -43,10 +43,12 @@ class ClearanceLimit(Fixed):
     own a_j in its own time. (2) says that it stops in time when it brakes: where w has reached s, nothing may be added.
     With one joint in motion (2) is the stricter one, and that of the joint alone.
 
-    **What is promised**, with n and J held: whoever obeys the row stays the margin away; and while the speeds of
-    approach that he adds come from joints that approach, braking at the limits of all joints never leads nearer, at
-    any of eight times until all stand. Braking obeys (2) at the next tick. **What is not**: n and J turn while the arm
-    moves; speed moved from one joint to another that brakes more slowly counts one tick later; limits of position and
+    Both see, to second order, that points move on bent ways while joints turn (`qpsafe.geometry.reach.bending`).
+
+    **What is promised**, with n held: whoever obeys the row stays the margin away; and while the speeds of approach
+    that he adds come from joints that approach, braking at the limits of all joints never leads nearer, at any of
+    eight times until all stand. Braking obeys (2) at the next tick. **What is not**: n turns where edges pass each
+    other; speed moved from one joint to another that brakes more slowly counts one tick later; limits of position and
     velocity may keep a joint from going against the row; rows of several pairs may conflict; and a tick has 16 rows at
     most, those with the least room. That is what the gate looks at, along the whole braking motion.
 

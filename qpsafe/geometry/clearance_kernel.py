@@ -5,12 +5,12 @@ g·q̇ <= the lower of two bounds, with s = d - margin. The first is that of a j
 
     (1)  stopping_speed(s) at the deceleration Σ_j |g_j| a_j,
 
-which the joints have together if all go against the row. The second looks at the robot braking, each joint at its own
-limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from its velocity now, and the pair has come
-nearer by Σ_j g_j φ_j(m), most after m* ticks. A speed of approach that is higher by δ leads farther by (m* + 1) dt δ at
-most while the joints that give it brake, so
+which the joints have together if all go against the row, less what `bending` takes of it. The second looks at the
+robot braking, each joint at its own limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from
+its velocity now, and the pair has come nearer by w = Σ_j g_j φ_j(m) + `bending`, most after m* ticks. A speed of
+approach that is higher by δ leads farther by (m* + 1) dt δ at most while the joints that give it brake, so
 
-    (2)  g·q̇_now + (s - max_m Σ_j g_j φ_j(m)) / ((m* + 1) dt).
+    (2)  g·q̇_now + (s - max_m w) / ((m* + 1) dt).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from qpsafe.geometry.clearance_work import MOST, cut_rows
 from qpsafe.geometry.layout import BALL, BODY, FLOATS, INTEGERS, SPHERE, VERTEX
 from qpsafe.geometry.nearness import apart, cut_tables, shape_pose
 from qpsafe.geometry.pairs import measured
-from qpsafe.geometry.reach import along_normal, passes, prepare, reach
+from qpsafe.geometry.reach import along_normal, bending, passes, prepare, reach
 from qpsafe.geometry.separation import WORK
 from qpsafe.geometry.support import support
 from qpsafe.limits import stopping_speed
@@ -77,14 +77,17 @@ def _bound(
         most += abs(g) * (r.far[j] if g * qd[j] >= 0.0 else r.back[j])
     if most <= s:
         return inf, inf
-    way, ticks = -inf, 1.0
+    way, ticks, back = -inf, 1.0, (-n[0], -n[1], -n[2])
     for i in range(r.times.shape[0]):
         covered = 0.0
         for j in range(qd.shape[0]):
             covered += r.g[j] * r.ahead[i, j]
+        covered += bending(t, twists, r.ahead[i], a, b, p, o, n) + bending(t, twists, r.ahead[i], b, a, o, p, back)
         if covered > way:
             way, ticks = covered, r.times[i]
-    bound = min(highest(s, push, dt), speed + (s - way) / ((ticks + 1.0) * dt))
+    # what bends towards the other takes of the deceleration
+    bent = 2.0 * dt * (bending(t, twists, qd, a, b, p, o, n) + bending(t, twists, qd, b, a, o, p, back))
+    bound = min(highest(s, max(push - bent, 0.2 * push), dt), speed + (s - way) / ((ticks + 1.0) * dt))
     return max(bound, -RETURN_SPEED), bound - speed - push
 
 

@@ -107,3 +107,34 @@ def passes(t: Any, r: Any, twists: Array, qd: Array, a: int, shape: int, c: Vect
         if gap > 0.0 and gap > along_normal(t, r, twists, qd, a, 0, c, c, size, n):
             return True
     return False
+
+
+@inline
+def bending(t: Any, twists: Array, ahead: Array, body: int, other: int, p: Vector, o: Vector, n: Vector) -> float:
+    """How much nearer two points come than nᵀ J says, to second order, as joints that move one body alone turn by Δ.
+
+    With exp(ξ_1 Δ_1) ... exp(ξ_k Δ_k) the point p of the body moves by Σ_j J_j Δ_j + Σ_{j<k} ω_j × J_k Δ_j Δ_k + ½ Σ_j
+    ω_j × J_j Δ_j². That counts where a corner of the body meets a face that stays; where a face of the body meets a
+    corner o, it moves the other way in the body's frame, in the opposite order. The larger of the two, not below 0.
+
+    Args:
+        t: The solids.
+        twists: Of the joints.
+        ahead: Δ (n,).
+        body, other: The two bodies.
+        p, o: Points of them.
+        n: From p to o.
+    """
+    corner, face = 0.0, 0.0
+    turn, shift = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for j in range(ahead.shape[0]):
+        if t.supports[body, j] == 0.0 or t.supports[other, j] != 0.0:
+            continue
+        w = (twists[3, j], twists[4, j], twists[5, j])
+        v = (twists[0, j], twists[1, j], twists[2, j])
+        at_p, at_o = add(v, 1.0, cross(w, p)), add(v, 1.0, cross(w, o))
+        x = ahead[j]
+        corner += x * dot(n, cross(add(turn, 0.5 * x, w), at_p))
+        face -= x * dot(n, cross(w, add(shift, 0.5 * x, at_o)))
+        turn, shift = add(turn, x, w), add(shift, x, at_o)
+    return max(corner, face, 0.0)
