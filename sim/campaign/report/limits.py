@@ -40,6 +40,11 @@ class LimitMeasure(NamedTuple):
     value: Callable[[Sequence[Limit]], float | None]
     scale: float = 1.0
 
+    @property
+    def heading(self) -> str:
+        """Over its column, with the unit."""
+        return self.title if self.unit == "trials" else f"{self.title} [{self.unit}]"
+
     def shown(self, said: dict[str, Any]) -> str:
         """The value of a summary in its unit as shown; a dash if there is none."""
         value = said[self.name]
@@ -119,14 +124,13 @@ def limits_section(found: dict[str, Any], contacts: dict[str, int]) -> Html:
         low, high = said["avoidable_interval"]
         cells[2] = joined((cells[2], element("small", f"{percent(low)} to {percent(high)} %")))
         lines.append([name, *cells])
-    heads = [m.title if m.unit == "trials" else f"{m.title} [{m.unit}]" for m in MEASURES]
     meanings = [(m.title, m.name, m.unit, m.meaning) for m in MEASURES]
     more = table(("measure", "in JSON", "shown in", "definition"), meanings, range(4))
     return joined(
         (
             element("h2", "What was possible"),
             element("p", METHOD),
-            table(["contacts of", *heads], lines),
+            table(["contacts of", *(m.heading for m in MEASURES)], lines),
             element("details", element("summary", "Definitions"), more),
         )
     )

@@ -5,6 +5,7 @@ A table stands between two comments, the first of which says what is in it:
     <!-- campaign: columns -->                  what a row holds
     <!-- campaign: measures -->                 what is made of rows
     <!-- campaign: limits -->                   what is made of limits
+    <!-- campaign: possible -->                 limits of the controllers for whom they were searched
     <!-- campaign: contacts, energy_p95 -->     controllers by these measures, with limits
     <!-- campaign: less stop: contacts -->      differences to a reference
     <!-- campaign: end -->
@@ -52,8 +53,13 @@ def _table(what: str, found: dict[str, Any] | None) -> str:
         figures = [(m.title, f"`{m.name}`", m.unit, m.meaning) for m in FIGURES]
         return _lines(("measure", "in JSON", "unit shown", "definition"), shares + figures)
     if what == "limits":
-        lines = [(m.title, f"`{m.name}`", m.unit, m.meaning) for m in LIMITS]
-        return _lines(("measure", "in JSON", "unit shown", "definition"), lines)
+        return _lines(
+            ("measure", "in JSON", "unit shown", "definition"),
+            [(m.title, f"`{m.name}`", m.unit, m.meaning) for m in LIMITS],
+        )
+    if what == "possible" and found is not None and "limits" in found:
+        rows = [[f"`{who}`", *(m.shown(said) for m in LIMITS)] for who, said in found["limits"].items()]
+        return _lines(["contacts of", *(m.heading for m in LIMITS)], rows)
     less, _, names = what.rpartition(": ")
     unknown = [name for name in names.split(", ") if name not in MEASURES]
     if found is None or unknown or (less and less.removeprefix("less ") not in found["references"]):

@@ -12,7 +12,9 @@ import made_up_trials
 import pytest
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.limit.row import Limit
 from qpsafe.sim.campaign.plan import Plan, parse_plan
+from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.markdown import asked, filled
 from qpsafe.sim.campaign.report.measures import MEASURES
 from qpsafe.sim.campaign.report.summary import summary
@@ -35,7 +37,7 @@ def script() -> Any:
 
 
 TABLES = script()
-DEFINED = {"columns", "measures"}
+DEFINED = {"columns", "measures", "limits"}
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +77,15 @@ def test_a_number_that_is_not_in_the_summary_is_noticed(found: dict[str, Any]) -
     for begin, end in numbers:
         changed = text[:begin] + str(int(text[begin:end]) + 1) + text[end:]
         assert filled(changed, found) != changed
+
+
+def test_what_was_possible_is_told_where_it_was_searched(found: dict[str, Any]) -> None:
+    mark = "<!-- campaign: possible -->\n<!-- campaign: end -->\n"
+    with pytest.raises(ConfigurationError, match="possible"):
+        filled(mark, found)
+    limit = Limit(3, 3, "hold", "default", 1.5, -0.06, -0.09, 0.0432, 0.05, True, True, True, 0.25, 800)
+    text = filled(mark, found | {"limits": {"default": limits_summary([limit, limit._replace(seen=False)])}})
+    assert "| `default` | 2 | 1 | 2 | 2 | 0 | 43 | -60 | 25 |" in text
 
 
 def test_what_the_page_says_of_the_tables_is_so() -> None:
