@@ -1,4 +1,4 @@
-"""Fill the tables of docs/campaign.md and README.md from docs/data/*.json: python docs/campaign_tables.py."""
+"""Fill the tables of campaigns in README.md and docs/*.md from docs/data/*.json: python docs/campaign_tables.py."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 from qpsafe.sim.campaign.report.markdown import filled
 
 DOCS = Path(__file__).resolve().parent
-PAGES = (DOCS / "campaign.md", DOCS.parent / "README.md")
+#: Pages, and the campaign each is filled from.
+PAGES = {DOCS / "campaign.md": "campaign", DOCS.parent / "README.md": "campaign", DOCS / "verified-motion.md": "verified"}
 DATA = DOCS / "data" / "campaign.json"
 
 
@@ -50,9 +51,14 @@ def engine() -> str:
     return "\n".join(["| what | measured |", "| --- | --- |", *(f"| {what} | {value} |" for what, value in rows)])
 
 
-def made(text: str) -> str:
-    """A page with all its tables made anew."""
-    text = filled(text, committed())
+def made(text: str, campaign: str = "campaign") -> str:
+    """A page with all its tables made anew.
+
+    Args:
+        text: Of the page.
+        campaign: Name of the file in docs/data.
+    """
+    text = filled(text, committed(campaign))
     for mark, table in (("worst", worst), ("engine", engine)):
         pattern = re.compile(rf"<!-- {mark} -->\n.*?<!-- {mark}: end -->", re.DOTALL)
         text = pattern.sub(lambda _, m=mark, t=table: f"<!-- {m} -->\n\n{t()}\n\n<!-- {m}: end -->", text)
@@ -60,5 +66,5 @@ def made(text: str) -> str:
 
 
 if __name__ == "__main__":
-    for page in PAGES:
-        page.write_text(made(page.read_text(encoding="utf-8")), encoding="utf-8")
+    for page, campaign in PAGES.items():
+        page.write_text(made(page.read_text(encoding="utf-8"), campaign), encoding="utf-8")
