@@ -79,7 +79,7 @@ def path(
             lag=lag,
             duration=length,
             story=told,
-            recovery=RecoveryRules(enabled="no recovery" not in name),
+            recovery=RecoveryRules(enabled=False) if "no recovery" in name else None,
             program=PROGRAM if program is None else program,
         )
         for name, law in laws.items()

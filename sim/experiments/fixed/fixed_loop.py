@@ -65,8 +65,6 @@ class FixedLoop:
             limits=None if experiment.limits else "off",
             known=known_obstacles(scene),
             barrier=None if experiment.cap is None else DangerBarrier(experiment.cap),
-            sensing=experiment.rules,
-            recovery=experiment.recovery,
             **parts,
         )
         spots = self.controller.spots

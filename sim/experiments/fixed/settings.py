@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
 from qpsafe.laws.problem import Law
+from qpsafe.recovery.returns import RecoveryRules
+from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.choreography import Choreography
@@ -18,9 +20,7 @@ from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 
 if TYPE_CHECKING:
-    from qpsafe.recovery.recovery import RecoveryRules
     from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.rules import SensingRules
     from qpsafe.sim.stories.story import Story
 
 
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 class FixedSettings(Control):
     """Everything that defines one run; equal settings give bit-identical logs (wall times aside). Tasks, thresholds,
     evasion and metrics of one's own are those of `Control`.
+
+    With the choreography, which shows Table I, evasion, sensing and recovery are the paper's unless they are given:
+    people count as standing still, so that levels of danger are passed one by one. With a story they are the
+    controller's default.
 
     Attributes:
         robot: The robot, with spots.
@@ -37,10 +41,10 @@ class FixedSettings(Control):
         limits: Whether the joint limits are on.
         duration: Length [s].
         sensor: ``ideal`` distances, or those of ``sharp`` sensors.
-        rules: What counts as danger, and what sick sensors do; None for the controller's default.
+        rules: What counts as danger, and what sick sensors do; None for the default, see above.
         cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
-        recovery: How the robot returns to its path; None for the controller's default.
+        recovery: How the robot returns to its path; None for the default, see above.
         story: Who does what instead of the choreography; `seed` varies it too.
     """
 
@@ -63,6 +67,14 @@ class FixedSettings(Control):
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:
             self.choreography = robot_stage(self.robot).choreography
+
+    def parts(self) -> dict[str, Any]:
+        """Parts of the controller as arguments of `SafetyController`; None for its default."""
+        found = super().parts() | {"sensing": self.rules, "recovery": self.recovery}
+        if self.story is None:
+            paper = {"evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper()}
+            found |= {name: part for name, part in paper.items() if found[name] is None}
+        return found
 
     @cached_property
     def scene(self) -> Scene:

@@ -126,7 +126,7 @@ def test_the_robot_sees_itself_and_it_does_not_count() -> None:
     robot, stage = ROBOT.with_spots("spots-by-hand.toml"), robot_stage(ROBOT).choreography
     farther = replace(stage.approaches[0], start=0.3, medium_distance=1.02)
     stage = replace(stage, approaches=(farther,))
-    rules = qpsafe.SensingRules(hold_time=0.3)
+    rules = qpsafe.SensingRules(hold_time=0.3, velocities=False)
     experiment = FixedExperiment(robot, rules=rules, duration=8.0, choreography=stage)
     log = experiment.run()
     assert set(log.status) == {"ok"}
