@@ -11,7 +11,11 @@ from qpsafe.sim.campaign.report.markdown import filled
 
 DOCS = Path(__file__).resolve().parent
 #: Pages, and the campaign each is filled from.
-PAGES = {DOCS / "campaign.md": "campaign", DOCS.parent / "README.md": "campaign", DOCS / "verified-motion.md": "verified"}
+PAGES = {
+    DOCS / "campaign.md": "campaign",
+    DOCS.parent / "README.md": "campaign",
+    DOCS / "verified-motion.md": "verified",
+}
 DATA = DOCS / "data" / "campaign.json"
 
 
