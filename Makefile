@@ -40,6 +40,7 @@ bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical sol
 	$(BIN)/qpsafe bench --out bench.json
 	$(BIN)/qpsafe bench --compile --out bench-compile.json
 	$(BIN)/python benchmarks/bench_hqp.py --out bench-hqp.json
+	$(BIN)/python benchmarks/bench_gate.py bench-gate.json
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; ok = (3, 11) <= sys.version_info[:2] <= (3, 14); sys.exit(0 if ok else "qpsafe needs Python 3.11 to 3.14, found " + sys.version.split()[0] + "; try: make PYTHON=python3.12")'
