@@ -1,6 +1,6 @@
 """Suspension and recovery of the tasks' path, section IV-C of the paper, as one small state machine.
 
-following ──danger above Δ(1-ε)──> suspended ──danger below──> recovering ──back at x_d,s──> following
+following ──danger above Δ(1-ε)──> suspended ──danger small for a while──> recovering ──back at x_d,s──> following
                                         ^────────danger above────────┘
 """
 
@@ -58,7 +58,7 @@ _way_on = steps.ways_by(_too_fast)
 class Recovery:
     """Clock of the tasks' path, and the references that lead back to it.
 
-    While suspended the clock stands still: x_d = x_d,s, ẋ_d = 0. When danger is past, every task returns smoothly from
+    While suspended the clock stands still, and tasks are held. When danger is past, every task returns smoothly from
     where it is then, x_d,r, to x_d,s. A task that is still released (a_k < 1) is not pulled: it is held where it is,
     its motion running out, and its return begins when it is fully active again and slow enough, be it after the path
     has gone on. The path goes on when every fully active task has returned; its clock comes to speed within `ramp`.
@@ -163,11 +163,10 @@ class Recovery:
             ValueError: A trajectory is not finite; the phase stays as it was.
         """
         self.waits_for = ()
-        before, of = self._code, (self, state, activations)
-        danger = not cdf_n <= self.suspend_above and self._rules.enabled
-        self._quiet = quiet_after(self._quiet, cdf_n, self._rules.calm * self.suspend_above, self._dt)
-        waits = self._quiet <= self._rules.dwell
-        phase, anew = _next_phase(before, self._changed, danger, waits, self.path_time, of)
+        before, of, rules = self._code, (self, state, activations), self._rules
+        danger = not cdf_n <= self.suspend_above and rules.enabled
+        self._quiet = quiet_after(self._quiet, cdf_n, rules.calm * self.suspend_above, self._dt)
+        phase, anew = _next_phase(before, self._changed, danger, self._quiet <= rules.dwell, self.path_time, of)
         self._changed = False
         if phase != before:
             self._enter(phase)
@@ -183,7 +182,7 @@ class Recovery:
             samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
             # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
             return tuple([sample.slowed(0.0) for sample in samples] if self.waits_for else samples)
-        if self.phase == SUSPENDED and before == phase and (self._rules.held or not danger):
+        if self.phase == SUSPENDED and before == phase and (rules.held or not danger):
             return tuple([self._reference(k, state, 0.0) for k in range(len(self.tasks))])
         if self.phase == SUSPENDED:
             held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
@@ -205,11 +204,8 @@ class Recovery:
         """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""
         if not self._cursors:
             return ()
-        found, due = [], []
-        for cursor in self._cursors:
-            count, events = cursor.due_until(self.path_time)
-            found += events
-            due.append((cursor, count))
+        looked = [(cursor, *cursor.due_until(self.path_time)) for cursor in self._cursors]
+        found, due = [event for _, _, events in looked for event in events], [one[:2] for one in looked]
         self._due = due, {event for event in (*self._passed, *found) if event[0] == self.path_time}
         return tuple([name for _, name in sorted(found, key=itemgetter(0))])
 
@@ -238,9 +234,8 @@ class Recovery:
         task = JointTask(FixedJoints(posture))
         self._led, self._way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
         self._way.set_tasks([task], self.suspend_above, restart=False)
-        self._returns = [None] * len(self.tasks)
+        self._returns, self._offsets = [None] * len(self.tasks), [None] * len(self.tasks)
         self._pending = [True] * len(self.tasks)
-        self._offsets = [None] * len(self.tasks)
         return True
 
     def _suspend(self) -> None:
