@@ -4,13 +4,13 @@ The same encounter of the IRB 140 under four controllers, a tick of each in turn
 neither. Somebody is in reach of the tool, or nobody is near. Medians of each tick, and their differences.
 """
 
-import json
 import sys
 from pathlib import Path
 
 import numpy as np
 
 import qpsafe
+from qpsafe.text.json_text import json_text
 
 TICKS = 5_000
 KINDS = {"neither": ("off", "off"), "gate": (None, "off"), "rows": ("off", None), "both": (None, None)}
@@ -63,7 +63,7 @@ def main() -> None:
         cells = "".join(f"{value:>10.1f}" for value in row.values())
         print(f"{what:<24}{cells}{added:>12.1f}{added / row['neither']:>8.2f}")
     if len(sys.argv) > 1:
-        Path(sys.argv[1]).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        Path(sys.argv[1]).write_text(json_text(found) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -96,7 +96,8 @@ def test_paths_that_tell_no_end_are_looked_at_as_far_as_need_be(pairs: Any, come
 
 def test_sick_sensors_are_the_robots_own(pairs: Any, irb140: Any) -> None:
     """Silent, stuck, stale, negative, in centimetres, acknowledged: each robot as if it were alone."""
-    loop = pairs(lambda: qpsafe.SafetyController(irb140, fixed_tasks(irb140)), 8)
+    soon = qpsafe.RecoveryRules.paper()  # on the way back
+    loop = pairs(lambda: qpsafe.SafetyController(irb140, fixed_tasks(irb140), recovery=soon), 8)
     rng, k_spots, told = np.random.default_rng(2), len(loop.controllers[0].spots), [set() for _ in range(8)]
     for k in range(700):
         base = 0.55 + 0.3 * np.cos(0.015 * k + np.arange(8))[:, None] + rng.normal(0.0, 2e-3, (8, k_spots))

@@ -34,7 +34,7 @@ def tasks_at(robot: Any, shift: Any) -> list[Any]:
 def controller_at(robot: Any, tasks: list[Any], known: Any, **parts: Any) -> Any:
     tools = len(robot.tool_frames)
     activation = qpsafe.robot_activation(robot, tools, tools) if tools > 1 else None
-    return qpsafe.SafetyController(robot, tasks, activation=activation, known=known, **parts)
+    return qpsafe.SafetyController(robot, tasks, activation=activation, known=known, **({"gate": "off"} | parts))
 
 
 def distances(robot: Any, known: Any) -> Any:

@@ -87,7 +87,9 @@ STATE = {
     "controller": {"sensing", "recovery", "evasion"},
 }
 #: Exchanged by assignment; the test below shows that they take effect.
-EXCHANGED = {"controller": {"law", "field", "activation", "evasion", "limits", "barrier", "clearance"}}
+EXCHANGED = {
+    "controller": {"law", "field", "activation", "evasion", "limits", "barrier", "clearance", "separation", "gate"}
+}
 #: Read at every tick, and nowhere else.
 LIVE = {kind: {"name", "essential"} for kind in ("position", "orientation", "frame", "relative")}
 LIVE |= {kind: {"name", "essential", "frames"} for kind in ("joint", "posture")}  # they have no frames

@@ -67,7 +67,7 @@ def test_what_a_capsule_adds_is_told_and_it_is_in_few_pieces(seed: int, long: fl
     middle = 0.5 * (made.ends[:, 0] + made.ends[:, 1])
     assert (made.adds > -1e-9).all()
     assert len(made.radii) <= 4
-    assert (np.linalg.norm(middle, axis=1) < long).all()
+    assert (np.linalg.norm(middle, axis=1) < long + 0.1).all()
 
 
 @pytest.mark.parametrize("name", ["irb140", "iiwa14", "irb14000"])

@@ -45,7 +45,7 @@ WALL = Obstacle.box("wall", (0.1, 1.0, 1.0), POSE[:3, 3] + (0.15, 0.0, 0.0))
 
 
 def test_a_wall_in_the_way_is_not_touched_and_named() -> None:
-    told = run(towards(0.3, known=[WALL]), 400)
+    told = run(towards(0.3, known=[WALL], clearance="off"), 400)
     held = [tick.gate for tick in told if tick.gate.cause]
     assert held
     assert {gated.cause for gated in held} == {"furniture"}
@@ -53,7 +53,7 @@ def test_a_wall_in_the_way_is_not_touched_and_named() -> None:
     assert all(gated.verified and 0.0 <= gated.share <= 1.0 for gated in held)
     assert ROBOT.pose("tcp", told[-1].reference.q)[0, 3] < POSE[0, 3] + 0.1
     assert "near wall (furniture)" in [tick for tick in told if tick.gate.cause][-1].explain()
-    free = run(towards(0.3, known=[WALL], gate="off"), 400)
+    free = run(towards(0.3, known=[WALL], gate="off", clearance="off"), 400)
     assert ROBOT.pose("tcp", free[-1].reference.q)[0, 3] > POSE[0, 3] + 0.2  # it does go there otherwise
 
 
@@ -71,7 +71,7 @@ def test_without_limits_it_is_off() -> None:
 
 
 def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
-    controller, q = towards(0.3, known=[WALL]), ROBOT.home
+    controller, q = towards(0.3, known=[WALL], clearance="off"), ROBOT.home
     run(controller, 1)
     controller.gate = "off"
     assert (controller.gate, controller.verifies) == ("off", None)

@@ -165,7 +165,7 @@ def test_a_silent_robot_stops_the_stream_until_it_starts_anew(cell: Cell) -> Non
 @pytest.mark.parametrize("category", StopCategory)
 def test_leaving_brakes_first_and_is_silent_then(category: StopCategory) -> None:
     cell = Cell(shift=0.3)
-    cell.run(300)
+    cell.run(150)
     limits = cell.here.loop.session.limits
     assert np.abs(cell.answers[-1].qd_ref).max() > 0.05  # on the way
     before = len(cell.answers)

@@ -29,8 +29,8 @@ class Attacking(HierarchicalLaw):
 
 
 def attacking(station: Any) -> Any:
-    """Goes for whom it sees."""
-    return station.controller(Attacking())
+    """Goes for whom it sees: no gate would let it."""
+    return station.controller(Attacking(), gate="off", clearance="off")
 
 
 @pytest.fixture(scope="module")

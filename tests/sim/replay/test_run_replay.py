@@ -150,7 +150,6 @@ def test_damage_anywhere_in_the_file_is_an_error_or_changes_nothing(
     except RunFileError as error:
         assert "bad.npz: " in str(error)  # noqa: PT017
     else:  # such as the time of an entry of the archive
-        assert where > 0.9
         assert all(
             np.array_equal(a, found.arrays[name], equal_nan=a.dtype.kind == "f") for name, a in run.arrays.items()
         )
