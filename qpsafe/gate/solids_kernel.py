@@ -4,15 +4,16 @@ Pairs of shapes are in groups: those of one body against what stands, those of t
 nearer to its counterpart faster than V = Σ_j L_gj |q̇_j|. So a distance d measured once, at a configuration q*, holds
 good as long as  Σ_j L_gj |q_j - q*_j| < d - margin  all along the way: that is the usual tick, without any measuring.
 Else the distance is measured again, and if that does not do, at instants along the way: from one with the distance d
-on to the next one after d / V, where it has to be at least the margin again. Between two instants a and b it is never
-below (d_a + d_b - V h)/2 = d_b/2, half the margin.
+on to the next one after (d - margin) / V, or at the end of the tick, or after d / V, where it has to be at least the
+margin again. So it is at the end of every tick, whatever is sent then; and between two instants a and b it is never
+below (d_a + d_b - V h)/2 >= d_b/2, half the margin.
 
 What is nearer than the margin already may not come any nearer.
 """
 
 from __future__ import annotations
 
-from math import nan
+from math import floor, nan
 from typing import Any
 
 from qpsafe.compiled.compiled import Array, inline, linked
@@ -77,7 +78,9 @@ def touched(t: Any, w: Any, known: Array, q: Array, v: Array) -> int:
             fastest, tick = 0.0, time // dt
             for j in range(n):
                 fastest += t.group_levers[g, j] * abs(braked(v[j], t.acceleration[j], dt, tick))
-            time += max(d, 0.5 * margin) / fastest
+            # where the distance cannot fall below what is asked for; else not beyond the end of the tick
+            rest = (floor(time / dt + 1e-6) + 1.0) * dt - time
+            time += max((d - least) / fastest, min(max(d, 0.5 * margin) / fastest, rest))
             at_time(q, v, t.acceleration, dt, time, w.there)
             way = 0.0
             for j in range(n):

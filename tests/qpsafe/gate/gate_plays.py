@@ -27,7 +27,8 @@ class Play:
     Attributes:
         approach: Fastest approach of a link to a seen point that it could touch [m/s].
         short: Ticks in which braking itself approached somebody too fast.
-        solids: Smallest distance to furniture and itself [m].
+        solids: Smallest distance to furniture and itself at the end of a tick [m].
+        start: The same at the beginning.
         excess: By how much a command left the box of the limits [rad/s].
         held: Ticks in which not all was let through.
         retreats: Of the ticks that were short, whether the approach was no faster than that of braking.
@@ -36,9 +37,14 @@ class Play:
     approach: float = 0.0
     short: int = 0
     solids: float = np.inf
+    start: float = np.inf
     excess: float = 0.0
     held: int = 0
     retreats: list[bool] = field(default_factory=list)
+
+    def kept_clear(self, margin: float) -> bool:
+        """Whether nothing came nearer than the margin, or than it was at first."""
+        return self.solids >= min(margin, self.start) - 1e-5
 
 
 def to_axes(robot: Robot, q: Array, points: Array) -> Array:
@@ -90,7 +96,7 @@ def play(
     seen = 4.0 * seen / np.linalg.norm(seen, axis=1)[:, None]
     goals, paces = rng.uniform(-0.8, 0.8, (people, 3)), rng.uniform(0.3, 1.0, people) * fastest
     reach = rules.radius(DT)
-    told.solids = nearest_of(gate.solids.solid, robot.at(q).body_poses(), pairs).distance
+    told.start = told.solids = nearest_of(gate.solids.solid, robot.at(q).body_poses(), pairs).distance
     for tick in range(ticks):
         if tick % 40 == 0:
             wanted = rng.normal(size=robot.nq) * robot.max_velocity * rng.choice([0.1, 0.4, 1.0])

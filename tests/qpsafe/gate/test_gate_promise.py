@@ -20,7 +20,7 @@ def test_nobody_who_could_be_touched_is_approached_and_nothing_is_touched(name: 
         told = plays.play(robot, seed, 1_000, look=2)
         assert told.approach <= VerifiedMotion().approach + 1e-6
         assert told.short == 0
-        assert told.solids > 0.5 * VerifiedMotion().margin - 1e-6
+        assert told.kept_clear(VerifiedMotion().margin)
         assert told.excess <= 1e-12
         held += told.held
     assert held > 100  # the plays ask for what is not let through
@@ -37,7 +37,7 @@ def test_where_people_do_what_was_not_reckoned_with_it_is_told(broken: str, play
         shorts += told.short
         brakes += told.retreats
         assert told.approach <= VerifiedMotion().approach + 1e-6  # wherever it is not told
-        assert told.solids > 0.5 * VerifiedMotion().margin - 1e-6  # that holds whatever people do
+        assert told.kept_clear(VerifiedMotion().margin)  # that holds whatever people do
         assert told.excess <= 1e-12
     assert shorts > 0
     assert all(brakes)  # braking at the limits, or all of a command that comes nearer by less
@@ -52,5 +52,5 @@ def test_a_million_ticks(name: str, plays: Any) -> None:
         ticks += 4_000
         assert told.approach <= VerifiedMotion().approach + 1e-6, seed
         assert (told.short, told.excess <= 1e-12) == (0, True), seed
-        assert told.solids > 0.5 * VerifiedMotion().margin - 1e-6, seed
+        assert told.kept_clear(VerifiedMotion().margin), seed
     assert ticks == 336_000  # a third of the million, a robot

@@ -15,6 +15,10 @@ BESIDE = np.array([[0.05, 0.0, 0.05]])  # [m] from the tip: high danger
 OVER = np.array([[0.05, 0.1, 0.2]])
 
 
+#: The evasion and the pace of the return that the paper has.
+PAPER: Any = {"evasion": "paper", "recovery": qpsafe.RecoveryRules.paper()}
+
+
 def tasks_on(trajectory: Any) -> list[Any]:
     return [qpsafe.PositionTask("tcp", trajectory), qpsafe.OrientationTask("tcp", trajectory)]
 
@@ -55,7 +59,7 @@ def test_two_hundred_hands(run: Any, irb140: Any, first: int) -> None:
 
 
 def test_danger_on_the_way_through_the_joints_suspends_it(run: Any, irb140: Any) -> None:
-    loop = run()
+    loop = run(recovery=qpsafe.RecoveryRules.paper())  # on its way at once
     for _ in range(100):
         loop.step(NOTHING)
     tip = irb140.pose("tcp", irb140.home)[:3, 3]
@@ -82,7 +86,7 @@ def test_danger_on_the_way_through_the_joints_suspends_it(run: Any, irb140: Any)
 
 
 def test_the_way_through_the_joints_ends_at_its_posture_and_then_on_the_path(run: Any, irb140: Any) -> None:
-    loop = run(q=irb140.home + 0.2)
+    loop = run(q=irb140.home + 0.2, recovery=qpsafe.RecoveryRules.paper())
     loop.step(irb140.pose("tcp", loop.q)[:3, 3] + BESIDE)
     loop.step(NOTHING)
     recovery, goal = loop.controller.recovery, irb140.home + np.array((0.3, -0.2, 0.1, 0.2, -0.3, 0.4))
@@ -137,7 +141,7 @@ def test_what_is_explained_is_not_said(run: Any, irb140: Any, seed: int) -> None
     start = irb140.pose("tcp", irb140.home)
     goal = start.copy()
     goal[:3, 3] += rng.uniform(-0.1, 0.1, 3)
-    loop = run(tasks=tasks_on(Line(start, goal, Rates(0.1, 0.5, 5.0))))
+    loop = run(tasks=tasks_on(Line(start, goal, Rates(0.1, 0.5, 5.0))), **PAPER)
     tip = start[:3, 3]
     for k in range(2500):
         danger = 200 < k < 1500  # more than 5 s of it
@@ -150,7 +154,7 @@ def test_what_was_said_is_taken_back_when_the_goal_changes(run: Any, irb140: Any
     """And the robot comes back from where it got to, though a limit blocks the straight way."""
     far = irb140.pose("tcp", irb140.home)
     far[0, 3] += 2.0
-    loop = run()
+    loop = run(**PAPER)  # faster, by default, it ends at a limit of joint 5, and says so
     loop.step(NOTHING)
     home = loop.controller.tasks
     loop.controller.set_tasks(tasks_on(qpsafe.FixedPose(far)))
