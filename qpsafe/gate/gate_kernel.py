@@ -10,7 +10,7 @@ from numba import types
 
 from qpsafe.compiled import by_reference as reference_module
 from qpsafe.compiled.by_reference import by_reference
-from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
+from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.compiled.memory import view
 from qpsafe.gate import braking_path, people_kernel, solids_kernel, tables, workspace
 from qpsafe.gate.braking_path import slow_down
@@ -68,7 +68,7 @@ def _within(t, w, q, points):  # type: ignore[no-untyped-def]
 
 
 _block, _whole = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
-_out, _outs = types.float64[::1], types.float64[:, ::1]
+_out = types.float64[::1]
 
 
 @entry(
@@ -132,7 +132,3 @@ def let_through(
         command[j] = command[j] if low == 1.0 else w.brake[j] + low * (command[j] - w.brake[j])
     told[SHARE], told[CAUSE], told[WHO], told[POINT] = low, cause, who, point
     return low
-
-
-let_through_compiled = linked(let_through, *USES)
-"""`let_through` for compiled code."""

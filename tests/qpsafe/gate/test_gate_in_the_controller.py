@@ -82,7 +82,6 @@ def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
     assert 0.1 - (ROBOT.pose("tcp", last.reference.q)[0, 3] - POSE[0, 3]) > 0.05 - 0.01
     with pytest.raises(ConfigurationError, match=r"gate.*'on'.*VerifiedMotion or \"off\""):
         controller.gate = "on"  # type: ignore[assignment]
-    assert controller.gate == controller.gate
     controller.limits = JointLimits.of(ROBOT).gentler(0.5)
     assert controller.verifies is not None
     assert controller.verifies.limits is controller._braking
