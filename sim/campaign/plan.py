@@ -38,7 +38,7 @@ CONTROLLERS = (
     *("none", "stop", "stop_perfect_sight", "scaling", "nullspace", "weighted", "paper", "strict", "barrier"),
     *("velocities", "default"),
 )
-FULL, QUICK = 3_000, 48
+FULL, QUICK = 3_000, 12
 LONGEST_LAG = 0.1  # [s]
 MOST_TRIALS = 10_000_000
 

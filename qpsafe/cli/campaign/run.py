@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 def run(
     *,
     file: File = None,
-    quick: Annotated[bool, typer.Option("--quick", help="48 trials, two minutes; only --out keeps them.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="12 trials, a minute; only --out keeps them.")] = False,
     trials: Annotated[int | None, typer.Option(help="How many; 3,000 by default.")] = None,
     controllers: Annotated[str | None, typer.Option(help="Names of whom to compare, separated by commas.")] = None,
     typed: Typed,
