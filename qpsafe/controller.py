@@ -230,7 +230,7 @@ class SafetyController(Running):
         if gate is not None:
             command = command.copy()
             gated = gate(self._q, self._qd, command, seen.points, old)
-        messages = (*stall.messages, *messages, *seen.notes, *self._units.notes(distances, points))
+        messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
             cdf_n=cdf_n,

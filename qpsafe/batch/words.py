@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from qpsafe.batch import code
 from qpsafe.batch.blocks import Own
+from qpsafe.gate.gated import TOO_NEAR
 from qpsafe.recovery.stall import TEXTS
 from qpsafe.sensing.health import HEALTHY, WORDS
 
@@ -27,6 +28,7 @@ _NOTES = {
     code.LIMIT_GAVE_WAY: "a joint limit was sacrificed for another one",
     code.LAW_EXCEEDED: "the law exceeded the limits, clipped",
     code.NOT_SOLVED: "law: not solved as planned",
+    code.TOO_NEAR: TOO_NEAR,
     code.ODD_UNITS: "readings or points too far away to be metres; +inf where nothing is in sight",
 }
 

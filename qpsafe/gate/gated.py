@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+#: What a tick says where its command is not verified.
+TOO_NEAR = "a link that could touch somebody moves towards them faster than allowed, though it brakes: seen too late"
+
 
 class Gated(NamedTuple):
     """What the gate did to a command.
@@ -31,6 +34,11 @@ class Gated(NamedTuple):
     def verified(self) -> bool:
         """Whether the robot can stop, or go away, before anybody reaches it."""
         return self.short == 0.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences for the tick's messages."""
+        return () if self.verified else (TOO_NEAR,)
 
     def __str__(self) -> str:
         if not self.cause:

@@ -136,7 +136,10 @@ def pack(
     pairs = np.vstack([np.zeros((0, 2), dtype=np.int64), *(group.pairs for group in groups)])
     sizes = np.array((n, len(far), len(groups), len(pairs), len(solids.index), len(solids.vertices),
                       len(solids.neighbours), len(solids.planes)), dtype=np.int64)  # fmt: skip
-    numbers = (limits.dt, rules.radius(0.0), rules.person_speed, rules.approach, rules.margin, FARTHEST, max_age)
+    numbers = (
+        limits.dt, rules.radius(0.0), rules.person_speed, rules.approach, rules.margin, FARTHEST, max_age,
+        rules.sidestep,
+    )  # fmt: skip
     floats = (
         numbers, limits.max_acceleration, tree.placements, tree.axes, tree.supports, capsules.ends, capsules.radii,
         far, [group.lever for group in groups], solids.shapes, solids.vertices, solids.planes,

@@ -1,7 +1,8 @@
 """Whether a command, and the braking after it, approaches somebody whom the robot could touch; compiled.
 
-A person seen at p moves no faster than v_h. After a time t on the way, p is at any p' with |p' - p| <= u = v_h t, and
-a link whose surface is nearer to p than R(t) could touch somebody: it must not approach any such p' faster than v_s.
+A person seen at p moves no faster than v_h. After a time t on the way, p is at any p' with |p' - p| <= u = v_h t, t
+no longer than the time `sidestep`, and a link whose surface is nearer to p than R(t) could touch somebody: it must not
+approach any such p' faster than v_s.
 With n from the nearest point of the capsule's axis to p, D its distance, (v, ω) the body's twist and B = v + ω × p the
 body's velocity field at p, the speed of approach to p' is n'ᵀ (v + ω × p'), where n' differs from n by an angle of
 θ at most, sin θ = u/D, since p - nearest(p) moves no farther than p does. So it is at most
@@ -18,7 +19,7 @@ distance from the axis of joint j at most, W = Σ_j |q̇_j|,
 body's own turning, again W Σ |q̇_j| ρ_j). Within a tick joints do not accelerate. A tick passes if S(u(t + dt)) + C dt
 <= v_s; m ticks at once if S(u(t + m dt)) + (Σ_j a_j ρ_j + C) m dt <= v_s, which implies it of each of them. So what is
 told does not depend on which ticks are looked at; and if a way passes, what is left of it passes a tick later, for any
-p' that p may have moved to: all that has to hold then is among what held before.
+p' that p may have moved to, if `sidestep` is infinite: all that has to hold then is among what held before.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from typing import Any
 
 from qpsafe.compiled.compiled import Array, inline, linked
 from qpsafe.gate.braking_path import at_time, braked, covered, ticks_of
-from qpsafe.gate.tables import APPROACH, DT, NEAR, PERSON
+from qpsafe.gate.tables import APPROACH, DT, NEAR, PERSON, SIDESTEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 
@@ -170,7 +171,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float,
             b, steps = sqrt(square), MOST
             along = along / distance if distance > 0.0 else b
             while True:
-                u, growth = person * (time + steps * dt), 0.0
+                u, growth = person * min(time + steps * dt, t.numbers[SIDESTEP]), 0.0
                 for j in range(n):
                     speed = abs(w.speeds[j])
                     if t.levers[c, j] > 0.0:

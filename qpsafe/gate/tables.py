@@ -13,9 +13,9 @@ from qpsafe.compiled.memory import view
 JOINTS, CAPSULES, GROUPS, PAIRS, SHAPES, VERTICES, EDGES, FACES = range(8)
 HEADER = 8
 #: `Tables.numbers`: tick; R(0) without age; person's speed; approach; margin; farthest distance that is
-#: measured; the oldest reading that counts.
-DT, NEAR, PERSON, APPROACH, MARGIN, FARTHEST, MAX_AGE = range(7)
-NUMBERS = 7
+#: measured; the oldest reading that counts; for how long people may step aside.
+DT, NEAR, PERSON, APPROACH, MARGIN, FARTHEST, MAX_AGE, SIDESTEP = range(8)
+NUMBERS = 8
 
 
 class Tables(NamedTuple):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.gate.gate import Gate
-from qpsafe.gate.gated import NO_AGES
+from qpsafe.gate.gated import NO_AGES, TOO_NEAR
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.limits import JointLimits
 from qpsafe.sensing.hulls import Obstacle
@@ -88,12 +88,15 @@ def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
 
 
 @given(
-    key=st.sampled_from(("person_speed", "latency", "servo_lag", "person_error", "approach", "margin")),
+    key=st.sampled_from(("person_speed", "latency", "servo_lag", "person_error", "approach", "margin", "sidestep")),
     value=st.sampled_from((-1.0, math.nan, math.inf, "1", None, True)),
 )
 def test_figures_that_are_none_are_refused_by_name(key: str, value: object) -> None:
     if value == "1":
         value = "one"
+    if (key, value) == ("sidestep", math.inf):  # the strictest promise
+        assert VerifiedMotion(sidestep=math.inf).sidestep == math.inf
+        return
     with pytest.raises(ConfigurationError, match=key):
         VerifiedMotion(**{key: value})  # type: ignore[arg-type]
 
@@ -113,6 +116,23 @@ def test_old_readings_make_the_reach_larger() -> None:
         assert shares[ahead, 0.04] <= shares[ahead, 0.0]
         assert shares[ahead, 1.0] == shares[ahead, -1.0] == shares[ahead, math.nan] == shares[ahead, 0.0]
     assert sum(shares[ahead, 0.04] < shares[ahead, 0.0] for ahead in np.arange(0.05, 0.6, 0.005)) >= 5
+
+
+def test_somebody_who_appears_before_a_moving_tool_is_told_by_the_tick_and_by_the_batch() -> None:
+    controller = towards(0.3)
+    many = qpsafe.BatchController(towards(0.3), 2)
+    assert many.compiled
+    q, qd = ROBOT.home, np.zeros(6)
+    for k in range(60):
+        near = ROBOT.pose("tcp", q)[:3, 3][None] + (0.05, 0.0, 0.0) if k == 40 else NOBODY
+        tick = controller.step(q, qd, points=near)
+        both = many.step([q, q], [qd, qd], points=[near, NOBODY])
+        assert (TOO_NEAR in tick.messages) is (tick.gate.short > 0.0) is (k == 40)
+        assert tick.status == ("degraded" if tick.gate.short > 0.0 else "ok")
+        if k == 40:
+            assert TOO_NEAR in both.words(0)
+            assert TOO_NEAR not in both.words(1)
+        q, qd = tick.reference.q, tick.reference.qd
 
 
 def test_copies_and_pickles_go_on_alike() -> None:
