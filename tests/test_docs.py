@@ -21,7 +21,7 @@ from qpsafe.tick import Tick
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [README, *sorted((ROOT / "docs").rglob("*.md"))]
 ALL = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: Examples that take an argument to be shorter.
@@ -145,7 +145,7 @@ def test_files_named_in_the_text_exist(page: Path) -> None:
 
 
 def test_every_field_of_a_tick_is_explained() -> None:
-    page = " ".join(inline_code(ROOT / "docs" / "controller.md"))
+    page = " ".join(inline_code(ROOT / "docs" / "reference" / "controller.md"))
     names = [field.name for kind in (Tick, JointReference) for field in dataclasses.fields(kind)]
     names += [name for name, value in vars(Tick).items() if isinstance(value, property)]
     assert not [name for name in names if not re.search(rf"\b{name}\b", page)]

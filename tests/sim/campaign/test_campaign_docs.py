@@ -23,7 +23,7 @@ from qpsafe.sim.campaign.runner import run_campaign
 from qpsafe.text.toml_text import TomlText
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-PAGE = DOCS / "campaign.md"
+PAGE = DOCS / "explanation" / "campaign.md"
 
 
 def script() -> Any:
