@@ -9,7 +9,7 @@ SHARED := -n 2 --dist loadfile --no-loadscope-reorder
 # tests start dozens of Pythons: each would compile every source again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow dev lint bench clean
+.PHONY: demo test test-slow dev lint docs figures bench clean
 
 demo: $(VENV)/.demo ## the paper's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
@@ -36,6 +36,14 @@ $(TYPED):
 	@ln -s $(CURDIR)/qpsafe/* $@/qpsafe/
 	@for name in tasks robots sim; do ln -sfn $(CURDIR)/$$name $@/qpsafe/$$name; done
 
+docs: $(VENV)/.docs ## the site, in build/docs/html; a warning is an error
+	$(BIN)/python -m sphinx -E -W --keep-going -q -j auto -b html -d build/docs/doctrees docs build/docs/html
+	$(BIN)/python docs/site_pages/links.py build/docs/html
+	@echo "docs: build/docs/html/index.html"
+
+figures: $(VENV)/.dev ## all figures of the docs again, from the code
+	for script in docs/figures*.py; do $(BIN)/python $$script || exit 1; done
+
 bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --out bench.json
 	$(BIN)/qpsafe bench --compile --out bench-compile.json
@@ -52,7 +60,11 @@ $(VENV)/.demo: $(VENV)/bin/python pyproject.toml constraints.txt
 
 $(VENV)/.dev: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	@touch $@ $(VENV)/.demo
+	@touch $@ $(VENV)/.demo $(VENV)/.docs
+
+$(VENV)/.docs: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@touch $@
 
 $(VENV)/.bench: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[video,bench]'

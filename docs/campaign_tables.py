@@ -12,9 +12,9 @@ from qpsafe.sim.campaign.report.markdown import filled
 DOCS = Path(__file__).resolve().parent
 #: Pages, and the campaign each is filled from.
 PAGES = {
-    DOCS / "campaign.md": "campaign",
+    DOCS / "explanation" / "campaign.md": "campaign",
     DOCS.parent / "README.md": "campaign",
-    DOCS / "verified-motion.md": "verified",
+    DOCS / "explanation" / "verified-motion.md": "verified",
 }
 DATA = DOCS / "data" / "campaign.json"
 

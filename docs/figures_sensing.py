@@ -1,4 +1,4 @@
-"""Draw the figures of docs/sensing.md: ``python docs/figures_sensing.py`` writes docs/img/sensing-*.png."""
+"""Draw the figures of docs/reference/sensing.md: ``python docs/figures_sensing.py`` writes docs/img/sensing-*.png."""
 
 from __future__ import annotations
 

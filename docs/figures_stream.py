@@ -1,4 +1,4 @@
-"""Draw the figure of docs/stream.md: ``python docs/figures_stream.py`` writes docs/img/stream-faults.png."""
+"""Draw the figure of docs/how-to/stream.md: ``python docs/figures_stream.py`` writes docs/img/stream-faults.png."""
 
 from __future__ import annotations
 

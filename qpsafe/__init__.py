@@ -40,7 +40,7 @@ _PUBLIC = {
     "PostureTask": "qpsafe.tasks.joint",
     "Program": "qpsafe.tasks.program",
     "QpsafeError": "qpsafe.errors",
-    "RecoveryRules": "qpsafe.recovery.recovery",
+    "RecoveryRules": "qpsafe.recovery.returns",
     "RelativeFrameTask": "qpsafe.tasks.frame",
     "Robot": "qpsafe.robot.robot",
     "RobotFileError": "qpsafe.errors",
@@ -100,7 +100,7 @@ if TYPE_CHECKING:
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
     from qpsafe.limits import Box as Box
     from qpsafe.limits import JointLimits as JointLimits
-    from qpsafe.recovery.recovery import RecoveryRules as RecoveryRules
+    from qpsafe.recovery.returns import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference
     from qpsafe.robot.loader import bundled_robots as bundled_robots
     from qpsafe.robot.loader import load_robot as load_robot

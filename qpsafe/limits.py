@@ -1,4 +1,4 @@
-"""Joint limits that can always be met: one box lower <= q̇ <= upper per tick (math section 4).
+"""Joint limits that can always be met: one box lower <= q̇ <= upper per tick (derivations, section 4).
 
 The box is the intersection of velocity limits, acceleration limits around the last command, and the largest speeds
 from which braking by at most a dt per tick still stops before the position limits. Whoever stays inside the box finds

@@ -21,13 +21,14 @@ from qpsafe.tick import Tick
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+MADE = ROOT / "docs" / "reference" / "api"  # by `make docs`, from the code
+PAGES = [README, *(page for page in sorted((ROOT / "docs").rglob("*.md")) if MADE not in page.parents)]
 ALL = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: Examples that take an argument to be shorter.
 ARGUMENTS = {"compare_to_nullspace.py": ["180"], "mink_evasion.py": ["--steps", "500"]}
 
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```([\w{}]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 
 
@@ -41,6 +42,11 @@ def fences(page: Path, language: str) -> list[tuple[int, str]]:
     return [(text.count("\n", 0, m.start(2)), m[2]) for m in FENCE.finditer(text) if m[1] == language]
 
 
+def is_tutorial(page: Path) -> bool:
+    """Tutorials run as a whole, in a folder of their own: tests/docs/test_tutorials.py."""
+    return page.parent.name == "tutorials"
+
+
 def inline_code(page: Path) -> list[str]:
     """What stands between single backticks, fenced blocks left out."""
     return re.findall(r"`([^`\n]+)`", FENCE.sub("", page.read_text(encoding="utf-8")))
@@ -51,7 +57,7 @@ def anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if fences(page, "python")], ids=label)
+@pytest.mark.parametrize("page", [page for page in PAGES if fences(page, "python") and not is_tutorial(page)], ids=label)
 def test_snippets_run_in_order(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One fresh namespace per page; errors point to the line of the page."""
     monkeypatch.chdir(ROOT)
@@ -82,10 +88,14 @@ def test_relative_links_and_pictures_exist(page: Path) -> None:
     assert not dead
 
 
-def test_every_page_is_on_the_index() -> None:
-    index = ROOT / "docs" / "index.md"
-    linked = {(index.parent / target).resolve() for target in LINK.findall(index.read_text(encoding="utf-8"))}
-    assert not set(PAGES) - linked - {index, README}
+def test_every_page_is_on_the_index_of_its_kind_and_in_the_contents() -> None:
+    home = ROOT / "docs" / "index.md"
+    contents = [line for _, text in fences(home, "{toctree}") for line in text.splitlines() if re.fullmatch(r"[\w/-]+", line)]
+    pages = {page.relative_to(home.parent).with_suffix("").as_posix() for page in PAGES if page not in (home, README)}
+    assert sorted(contents) == sorted({*pages, "reference/api/commands", "reference/api/index"})
+    for index in home.parent.glob("*/index.md"):
+        linked = {(index.parent / target.partition("#")[0]).resolve() for target in LINK.findall(index.read_text("utf-8"))}
+        assert not set(index.parent.glob("*.md")) - linked - {index}, index
 
 
 def test_every_picture_is_shown_somewhere() -> None:
@@ -145,7 +155,7 @@ def test_files_named_in_the_text_exist(page: Path) -> None:
 
 
 def test_every_field_of_a_tick_is_explained() -> None:
-    page = " ".join(inline_code(ROOT / "docs" / "controller.md"))
+    page = " ".join(inline_code(ROOT / "docs" / "reference" / "controller.md"))
     names = [field.name for kind in (Tick, JointReference) for field in dataclasses.fields(kind)]
     names += [name for name, value in vars(Tick).items() if isinstance(value, property)]
     assert not [name for name in names if not re.search(rf"\b{name}\b", page)]

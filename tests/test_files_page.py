@@ -1,4 +1,4 @@
-"""docs/files.md lists every key of every TOML file as the schemas have them, with defaults and units; both ways."""
+"""docs/reference/files.md lists every key of every TOML file as the schemas have it, default and unit too."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from qpsafe.sim.campaign.plan import PlanFile
 from qpsafe.sim.stories.steps import StoryTable
 from qpsafe.tasks.program_tables import ProgramFile
 
-PAGE = (Path(__file__).resolve().parents[1] / "docs" / "files.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[1] / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
 ROOTS: dict[str, type[BaseModel]] = {
     "Program": ProgramFile,
     "Cell": cell_file._Cell,

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from qpsafe.text.json_text import json_text
 
-#: In a source tree the last three lie beside `qpsafe`, where walking through its folder does not lead.
+#: In a source tree the last three lie beside the folder qpsafe, where walking through its folder does not lead.
 PACKAGES = ("qpsafe", "qpsafe.tasks", "qpsafe.robots", "qpsafe.sim")
 
 

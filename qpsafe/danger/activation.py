@@ -202,7 +202,7 @@ class Activation(Fixed):
 
 
 def regime_weights(activations: tuple[float, ...]) -> NDArray[np.float64]:
-    """Weights of the N+1 regimes in the blend of math section 1: w_k = a_k - a_(k+1), with a_0 = 1, a_(N+1) = 0.
+    """Weights of the N+1 regimes (derivations, section 1): w_k = a_k - a_(k+1), with a_0 = 1, a_(N+1) = 0.
 
     Args:
         activations: 1 >= a_1 >= ... >= a_N >= 0.

@@ -2,7 +2,7 @@
 
 For part i of a link, a capsule, and the seen point p_k,
 
-    d = |p_k - a| - r,    n = (p_k - a)/|p_k - a|,    nᵀ J_i(a) q̇ <= v_max(d)        (math section 6)
+    d = |p_k - a| - r,    n = (p_k - a)/|p_k - a|,    nᵀ J_i(a) q̇ <= v_max(d)        (derivations, section 6)
 
 as `qpsafe.danger.link_parts` measures them. v_max >= 0: standing and moving away are always allowed, so every robot
 that stands can meet the rows; they are a soft level, since one that is too fast already cannot. The speed counts that

@@ -1,1 +1,1 @@
-"""Motion that is verified before it is sent (math section 5)."""
+"""Motion that is verified before it is sent (derivations, section 5)."""

@@ -71,8 +71,8 @@ def solve_hierarchy(
     Returns:
         The solution. "solved" means optimal at every level to rounding, in any units of levels and hard rows; where
         rows of one level are so different in size that rounding decides, the status is "ill-conditioned" (figures:
-        docs/hierarchical-qp.md). Bad data never raise: `status` tells, and `qd` is finite and inside the box (a joint
-        whose own limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
+        docs/explanation/hierarchical-qp.md). Bad data never raise: `status` tells, and `qd` is finite and inside the
+        box (a joint whose own limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
 
     Raises:
         ConfigurationError: for shapes that do not fit and unknown solvers.

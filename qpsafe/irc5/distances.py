@@ -1,6 +1,6 @@
 """Distances over UDP: one datagram per sampling of all spots, from whatever reads the sensors to the loop.
 
-Little-endian, 24 + 8 k bytes, or 24 + 16 k with ages (docs/stream.md has the same table):
+Little-endian, 24 + 8 k bytes, or 24 + 16 k with ages (docs/how-to/stream.md has the same table):
 
     offset  type         what
     0       4 bytes      "QPSD"

@@ -1,7 +1,7 @@
 """A cap on the danger field, beyond the paper: CDF <= Δ_max as a soft level, and an exact speed scaling as last guard.
 
-At fixed q and p, CDF(q̇) = k1 S + k2 H(q̇), where H is convex and positively homogeneous in q̇ (math section 2). The
-person's own motion is not in it: the cap holds for what the robot adds.
+At fixed q and p, CDF(q̇) = k1 S + k2 H(q̇), where H is convex and positively homogeneous in q̇ (derivations, section 2).
+The person's own motion is not in it: the cap holds for what the robot adds.
 """
 
 from __future__ import annotations

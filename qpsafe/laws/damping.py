@@ -19,7 +19,7 @@ from math import sqrt
 from qpsafe.compiled.compiled import inline
 from qpsafe.hqp.own.linear import Array
 
-#: μ [s] where nothing else is said: ten ticks of 4 ms; see docs/laws.md.
+#: μ [s] where nothing else is said: ten ticks of 4 ms; see docs/explanation/laws.md.
 DAMPING_TIME = 0.04
 _HUGE = 1e60
 

@@ -1,4 +1,4 @@
-"""The law as a blend of hierarchical QPs under hard joint limits (math section 1)."""
+"""The law as a blend of hierarchical QPs under hard joint limits (derivations, section 1)."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class ClearanceLimit(ClearanceRows, mink.Limit):  # type: ignore[misc]
 
 
 class JointLimit(BoxRows, mink.Limit):  # type: ignore[misc]
-    """qpsafe's joint limits: position, velocity and acceleration in one box that is never empty (math section 4).
+    """qpsafe's joint limits: position, velocity and acceleration in one box, never empty (derivations, section 4).
 
     In place of mink's `ConfigurationLimit` and `VelocityLimit`: a start outside a position limit comes back inside at
     bounded speed, where those contradict each other and `solve_ik` raises.

@@ -227,7 +227,7 @@ class ClearanceBarrier(ClearanceRows, PinkBarrier):  # type: ignore[misc]
 
 
 class JointLimit(BoxRows, PinkLimit):  # type: ignore[misc]
-    """qpsafe's joint limits: position, velocity and acceleration in one box that is never empty (math section 4).
+    """qpsafe's joint limits: position, velocity and acceleration in one box, never empty (derivations, section 4).
 
     As `qpsafe.plugins.mink.JointLimit`, with the same arguments.
     """

@@ -143,7 +143,7 @@ class ClikRows(OnRobot):
 
 
 class DangerRows(OnRobot):
-    """CDF(q, q̇, p) <= Δ_max as rows G Δq <= h, for the most dangerous points (math section 2).
+    """CDF(q, q̇, p) <= Δ_max as rows G Δq <= h, for the most dangerous points (derivations, section 2).
 
     CDF = k1 S + k2 H(q̇), H convex and positively homogeneous: its tangent at the present velocity is exact along that
     velocity and never above H, so (with horizon 0) no velocity that meets the cap is cut off. What a tangent lets

@@ -1,9 +1,10 @@
 """Which readings can be believed. The one place that decides what makes a spot sick, dead, or the robot stop.
 
-The table of reactions is in docs/sensing.md. A reading is sick if it is not a number, below zero, minus infinity (REP
-117: too near to measure), stale, stuck, or of an impossible age: from the future, or older by more than the time that
-has passed; the clock it was taken by is wrong, and cannot tell when the sensor falls silent. +inf, and anything beyond
-the range, is healthy: nothing is in sight.
+The table of reactions is in docs/reference/sensing.md. A reading is sick if it is not a number, below zero, minus
+infinity (REP 117: too near to measure), stale, stuck, or of an impossible age: from the future, or older by more than
+the time that has passed; the clock it was taken by is wrong, and cannot tell when the sensor falls silent. +inf, and
+anything beyond the range, is healthy: nothing is in sight.
+
 Non-finite values are found before any arithmetic is done with them; every comparison is written so that NaN fails it.
 """
 

@@ -45,7 +45,7 @@ class _Column(NamedTuple):
 
 
 def read_pairs(path: Path) -> list[tuple[str, float, float]]:
-    """Pairs (spot, distance [m], voltage [V]) of a CSV file; `docs/sensing.md` says what it may look like.
+    """Pairs (spot, distance [m], voltage [V]) of a CSV file; `docs/reference/sensing.md` says what it may look like.
 
     Raises:
         ConfigurationError: Names the file, the line and the value that is wrong, or the delimiter found and the columns

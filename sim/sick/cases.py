@@ -1,4 +1,4 @@
-"""Sick sensors: what is wrong with them, and the reaction that docs/sensing.md promises for each case."""
+"""Sick sensors: what is wrong with them, and the reaction that docs/reference/sensing.md promises for each case."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sick sensors in closed loop: every case of docs/sensing.md, injected in the first experiment at random moments.
+"""Sick sensors in closed loop: every case of docs/reference/sensing.md, injected at random moments of experiment one.
 
 The healthy run is simulated once. At every moment it is copied, and each copy goes on with another fault for a while.
 What is checked: no contact that the healthy run did not have, no limit passed, and the reaction that the table states

@@ -1,4 +1,4 @@
-"""Joint limits that can always be met (math section 4)."""
+"""Joint limits that can always be met (derivations, section 4)."""
 
 import numpy as np
 import pytest

@@ -277,7 +277,7 @@ def test_lines_of_keys() -> None:
 
 
 def test_the_program_in_the_docs_is_one(tmp_path: Path) -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs" / "tasks.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "tasks.md").read_text(encoding="utf-8")
     program = load_program(write(tmp_path, page.split("```toml\n")[1].split("```")[0]), robot)
     assert [event.name for event in program.events] == ["grip", "release"]
 

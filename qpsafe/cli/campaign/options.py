@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 WORKERS = os.cpu_count() or 1
 
-File = Annotated[Path | None, typer.Argument(help="A plan, see docs/files.md; options go before what it says.")]
-FileOption = Annotated[Path | None, typer.Option("--file", help="A plan, see docs/files.md; options go before it.")]
+File = Annotated[Path | None, typer.Argument(help="A plan, docs/reference/files.md; options override it.")]
+FileOption = Annotated[Path | None, typer.Option("--file", help="A plan, as the argument; options override it.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")]
 Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler, which takes the place of --workers.")]
 Json = Annotated[bool, typer.Option("--json", help="Write what came of it as JSON to standard output.")]

@@ -1,4 +1,4 @@
-"""The compiled tick of the sensors against the rules of docs/sensing.md written down plainly, over bad sequences."""
+"""The compiled tick of the sensors against the rules of docs/reference/sensing.md, written plainly, bad data too."""
 
 import copy
 from typing import Any

@@ -9,7 +9,7 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
 def test_times_on_the_page_are_those_of_the_benchmark() -> None:
-    page = " ".join((DOCS / "verified-motion.md").read_text(encoding="utf-8").split())
+    page = " ".join((DOCS / "explanation" / "verified-motion.md").read_text(encoding="utf-8").split())
     found = json.loads((DOCS / "data" / "gate.json").read_text(encoding="utf-8"))
     near, nobody = found["a person in reach"], found["nobody near"]
     assert (

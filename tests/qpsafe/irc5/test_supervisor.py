@@ -10,7 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from qpsafe.irc5.supervisor import MOST_CAUSES, TRANSITIONS, Event, State, StopCategory, Supervisor
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "supervisor.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "supervisor.md"
 CAUSES = st.sampled_from(["sensor 3", "robot: motors off", "watchdog", "no packet", "operator"])
 CATEGORIES = st.sampled_from(StopCategory)
 

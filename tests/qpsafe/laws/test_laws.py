@@ -1,4 +1,4 @@
-"""The laws: eqs. (17), (18), (20), (22) against hierarchical and weighted QPs (math section 1)."""
+"""The laws: eqs. (17), (18), (20), (22) against hierarchical and weighted QPs (derivations, section 1)."""
 
 import numpy as np
 import pytest

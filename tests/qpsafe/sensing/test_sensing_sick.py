@@ -1,4 +1,4 @@
-"""The table of docs/sensing.md, line by line, on the sensing alone and in the controller."""
+"""The table of docs/reference/sensing.md, line by line, on the sensing alone and in the controller."""
 
 from typing import Any
 

@@ -23,7 +23,7 @@ from qpsafe.sim.campaign.runner import run_campaign
 from qpsafe.text.toml_text import TomlText
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-PAGE = DOCS / "campaign.md"
+PAGE = DOCS / "explanation" / "campaign.md"
 
 
 def script() -> Any:
@@ -118,6 +118,7 @@ def test_what_there_is_not_cannot_be_asked(what: str, found: dict[str, Any]) -> 
 
 
 def test_the_plan_on_the_page_is_one() -> None:
-    (text,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    plan = parse_plan(TomlText(text, PAGE))
+    page = DOCS / "how-to" / "campaign.md"
+    (text,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    plan = parse_plan(TomlText(text, page))
     assert plan == Plan(controllers=("none", "stop", "default"), sensor="sharp", lag=0.02, trials=5000, seed=100_000)

@@ -320,7 +320,7 @@ def test_every_point_is_an_encounter_in_every_cell(unit, reach, floor, tool, box
 
 
 def test_the_page_lists_every_number_with_its_source() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "campaign-people.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "explanation" / "campaign-people.md").read_text(encoding="utf-8")
     rows = {m[1]: (m[2], m[3]) for m in re.finditer(r"^\| `(\w+\.\w+)` \| (.*?) \| (.*?) \|$", page, re.MULTILINE)}
     file = toml_table(BUNDLED.read_text(encoding="utf-8"))
     listed = {f"{room}.{key}": value for room, tables in file.items() if room not in ("title", "kinds")

@@ -1,0 +1,77 @@
+"""Every tutorial runs from start to end in an empty folder, and prints what the page says that it prints."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+#: What a page says about setting up; here everything is set up, in an empty folder.
+SET_UP = ("make ", "source ", "cd ", "pip ")
+QPSAFE = "from qpsafe.cli.main import main; main()"
+#: Tutorials that take longer than a coffee sip.
+SLOW = {"your-own-arm.md"}
+PAGES = [
+    pytest.param(page, id=page.name, marks=[pytest.mark.slow] if page.name in SLOW else [])
+    for page in sorted(FOLDER.glob("*.md"))
+    if page.name != "index.md"
+]
+
+
+class Block(NamedTuple):
+    """A fenced block: its language, its text, and the line of the page that it begins at."""
+
+    language: str
+    text: str
+    line: int
+
+
+def blocks(page: Path) -> list[Block]:
+    """All fenced blocks of a page."""
+    text = page.read_text(encoding="utf-8")
+    return [Block(found[1], found[2], text.count("\n", 0, found.start()) + 1) for found in FENCE.finditer(text)]
+
+
+def matches(expected: str, printed: str) -> bool:
+    """Whether a text is as a page shows it; an ellipsis stands for anything."""
+    return re.fullmatch(".*?".join(map(re.escape, expected.strip().split("..."))), printed.strip(), re.DOTALL) is not None
+
+
+def run(command: str, folder: Path) -> str:
+    """What a command line prints to standard output; it has to end well."""
+    words = shlex.split(command, comments=True)
+    program = {"python": [sys.executable], "qpsafe": [sys.executable, "-c", QPSAFE]}[words[0]]
+    done = subprocess.run(
+        [*program, *words[1:]], cwd=folder, capture_output=True, text=True, timeout=900, env=os.environ | {"NO_COLOR": "1"}
+    )
+    assert done.returncode == 0, f"{command}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_tutorial_runs_in_an_empty_folder(page: Path, tmp_path: Path) -> None:
+    """A block that begins with `# save as NAME` is a file; text that follows a command is what it prints."""
+    printed, ran = "", 0
+    for block in blocks(page):
+        where = f"{page.name}:{block.line}"
+        if saved := re.match(r"(?:#|<!--) save as (\S+)", block.text):
+            (tmp_path / saved[1]).write_text(block.text, encoding="utf-8")
+        elif block.language == "bash":
+            printed = ""
+            for line in block.text.splitlines():
+                if line.strip() and not line.startswith((*SET_UP, "#")):
+                    printed += run(line, tmp_path)
+                    ran += 1
+        elif block.language == "text":
+            assert matches(block.text, printed), f"{where}: the page says\n{block.text}\nit prints\n{printed}"
+        else:
+            raise AssertionError(f"{where}: nothing is done with this block")
+    assert ran
