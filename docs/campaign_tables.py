@@ -1,4 +1,4 @@
-"""Fill the tables of campaigns in README.md and docs/*.md from docs/data/*.json: python docs/campaign_tables.py."""
+"""Fill tables of measured figures in README.md and docs from docs/data/*.json: python docs/campaign_tables.py."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ PAGES = {
     DOCS / "explanation" / "campaign.md": "campaign",
     DOCS.parent / "README.md": "campaign",
     DOCS / "explanation" / "verified-motion.md": "verified",
+    DOCS / "how-to" / "coming-from.md": "campaign",
 }
 DATA = DOCS / "data" / "campaign.json"
 
@@ -55,6 +56,42 @@ def engine() -> str:
     return "\n".join(["| what | measured |", "| --- | --- |", *(f"| {what} | {value} |" for what, value in rows)])
 
 
+def peers() -> str:
+    """What becomes of the same troubles in other libraries and here, a line a trouble."""
+    found = committed("peers")
+    names = ("mink", "pink", "placo", "qpsafe")
+
+    def told(trouble: str, run: dict[str, Any]) -> str:
+        if "raises" in run:
+            return f"raises `{run['raises']}`"
+        if "sends" in run:
+            return f"sends {run['sends']}"
+        hard = (
+            f"{run['acceleration']:.0f} times the acceleration limit"
+            if run["acceleration"] > 1.01
+            else "within all limits"
+        )
+        if trouble == "outside":
+            return f"comes back at up to {run['fastest']:.1f} rad/s, {hard}"
+        if trouble == "jump":
+            return hard
+        if trouble == "beyond":
+            return f"{run['last']:.1f} rad/s, {run['reversals']} reversals" if run["last"] else "at rest"
+        return "stays at rest" if run["fastest"] == 0.0 else f"brakes, {hard}"
+
+    heads = {
+        "outside": "joint 2 starts 20 mrad beyond its limit",
+        "jump": "the target jumps by 0.15 m",
+        "beyond": "the target is 1 m away, beyond reach: the last of 12 s",
+        "unreadable": "one measurement is NaN",
+    }
+    titles = [f"{name} {found[name]['version']}" for name in names]
+    rows = [f"| trouble | {' | '.join(titles)} |", "| --- | --- | --- | --- | --- |"]
+    for trouble, head in heads.items():
+        rows.append(f"| {head} | {' | '.join(told(trouble, found[name][trouble]) for name in names)} |")
+    return "\n".join(rows)
+
+
 def made(text: str, campaign: str = "campaign") -> str:
     """A page with all its tables made anew.
 
@@ -63,7 +100,7 @@ def made(text: str, campaign: str = "campaign") -> str:
         campaign: Name of the file in docs/data.
     """
     text = filled(text, committed(campaign))
-    for mark, table in (("worst", worst), ("engine", engine)):
+    for mark, table in (("worst", worst), ("engine", engine), ("peers", peers)):
         pattern = re.compile(rf"<!-- {mark} -->\n.*?<!-- {mark}: end -->", re.DOTALL)
         text = pattern.sub(lambda _, m=mark, t=table: f"<!-- {m} -->\n\n{t()}\n\n<!-- {m}: end -->", text)
     return text

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # docstrings need nothing compiled
 
 import qpsafe
 

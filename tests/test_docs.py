@@ -57,7 +57,9 @@ def anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if fences(page, "python") and not is_tutorial(page)], ids=label)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if fences(page, "python") and not is_tutorial(page)], ids=label
+)
 def test_snippets_run_in_order(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One fresh namespace per page; errors point to the line of the page."""
     monkeypatch.chdir(ROOT)
@@ -90,11 +92,15 @@ def test_relative_links_and_pictures_exist(page: Path) -> None:
 
 def test_every_page_is_on_the_index_of_its_kind_and_in_the_contents() -> None:
     home = ROOT / "docs" / "index.md"
-    contents = [line for _, text in fences(home, "{toctree}") for line in text.splitlines() if re.fullmatch(r"[\w/-]+", line)]
+    contents = [
+        line for _, text in fences(home, "{toctree}") for line in text.splitlines() if re.fullmatch(r"[\w/-]+", line)
+    ]
     pages = {page.relative_to(home.parent).with_suffix("").as_posix() for page in PAGES if page not in (home, README)}
     assert sorted(contents) == sorted({*pages, "reference/api/commands", "reference/api/index"})
     for index in home.parent.glob("*/index.md"):
-        linked = {(index.parent / target.partition("#")[0]).resolve() for target in LINK.findall(index.read_text("utf-8"))}
+        linked = {
+            (index.parent / target.partition("#")[0]).resolve() for target in LINK.findall(index.read_text("utf-8"))
+        }
         assert not set(index.parent.glob("*.md")) - linked - {index}, index
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,19 @@ from pygments.lexers.special import TextLexer
 from sphinx.addnodes import pending_xref, pending_xref_condition
 
 from site_pages import api, commands
-from site_pages.catalogue import targets
+from site_pages.catalogue import modules, targets
 from site_pages.markup import converted, scopes_of, where
 
 BEFORE_NAPOLEON = 400
 
 
 def on_init(app: Any) -> None:
-    """Pages that are made from the code, before Sphinx looks which pages there are."""
+    """Pages that are made from the code, before Sphinx looks which pages there are.
+
+    Everything is imported once here, and not by each of the processes that read pages.
+    """
+    for module in modules():
+        import_module(module)
     api.write(Path(app.srcdir) / "reference" / "api")
     commands.write(Path(app.srcdir) / "reference" / "api")
 

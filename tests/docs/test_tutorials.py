@@ -42,7 +42,9 @@ def blocks(page: Path) -> list[Block]:
 
 def matches(expected: str, printed: str) -> bool:
     """Whether a text is as a page shows it; an ellipsis stands for anything."""
-    return re.fullmatch(".*?".join(map(re.escape, expected.strip().split("..."))), printed.strip(), re.DOTALL) is not None
+    return (
+        re.fullmatch(".*?".join(map(re.escape, expected.strip().split("..."))), printed.strip(), re.DOTALL) is not None
+    )
 
 
 def run(command: str, folder: Path) -> str:
@@ -50,7 +52,12 @@ def run(command: str, folder: Path) -> str:
     words = shlex.split(command, comments=True)
     program = {"python": [sys.executable], "qpsafe": [sys.executable, "-c", QPSAFE]}[words[0]]
     done = subprocess.run(
-        [*program, *words[1:]], cwd=folder, capture_output=True, text=True, timeout=900, env=os.environ | {"NO_COLOR": "1"}
+        [*program, *words[1:]],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=900,
+        env=os.environ | {"NO_COLOR": "1"},
     )
     assert done.returncode == 0, f"{command}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
