@@ -1,4 +1,7 @@
-"""Capsules around a robot's collision hulls: what a person must not be touched by, a little larger than it is."""
+"""Capsules around a robot's collision hulls: what a person must not be touched by, a little larger than it is.
+
+Where the model has no collision geometry, they are those of the robot's wire, without thickness.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +66,7 @@ def _around(points: Array) -> list[tuple[Array, float, float]]:
     best: list[tuple[Array, float, float]] = []
     for count in range(1, PIECES + 1):
         pieces = _cut(points, count)
-        capsules = [(*_capsule(piece), piece) for piece in pieces]
+        capsules = [(*capsule_around(piece), piece) for piece in pieces]
         told = [(ends, radius, _adds(ends, radius, piece)) for ends, radius, piece in capsules]
         if not best or max(c[2] for c in told) < 0.8 * max(c[2] for c in best):
             best = told
@@ -105,8 +108,8 @@ def _axes(points: Array) -> Array:
     return axes
 
 
-def _capsule(points: Array) -> tuple[Array, float]:
-    """The smallest of some capsules around points: along each of their principal axes and the frame's."""
+def capsule_around(points: Array) -> tuple[Array, float]:
+    """Ends (2, 3), radius [m] of the smallest of some capsules around points: along their axes and the frame's."""
     best, ends, radius = np.inf, np.zeros((2, 3)), 0.0
     axes = np.vstack((_axes(points), np.eye(3)))
     for axis, centre, r in zip(axes, *_circles(points, axes), strict=True):

@@ -75,7 +75,7 @@ def runs(
         for speed in speeds:
             built = experiment_with(name, at_speed(speed), robot, law, lag)
             log = _run(built, None if observer is None else observer(name, speed, built))
-            yield FastRun(name, speed, encounter(log, robot), built, log)
+            yield FastRun(name, speed, encounter(log, built), built, log)
 
 
 def experiment_with(name: str, story: Story, robot: Robot, law: Law | None = None, lag: float = 0.0) -> Experiment:

@@ -83,8 +83,9 @@ def show(found: list[FastRun], screen: Console) -> None:
     """Print the table."""
     from qpsafe.cli.sheet import Sheet
 
-    numbers = ("at [s]", "least gap [mm]", "robot then [m/s]", "closing [m/s]", "moving in contact [s]", "CDF_n")
-    sheet = Sheet("Somebody walks straight at the robot", ("run", "walks [m/s]", "contact", *numbers))
+    speeds = ("robot then [m/s]", "closing [m/s]", "towards [m/s]")
+    headings = ("run", "walks [m/s]", "contact", "at [s]", "least gap [mm]", *speeds, "moving in contact [s]", "CDF_n")
+    sheet = Sheet("Somebody walks straight at the robot", headings)
     for run in found:
         e = run.encounter
         sheet.add_row(
@@ -95,6 +96,7 @@ def show(found: list[FastRun], screen: Console) -> None:
             f"{1e3 * e.distance:.0f}",
             f"{e.robot_speed:.3f}",
             f"{e.closing_speed:.2f}",
+            "-" if e.towards_speed is None else f"{e.towards_speed:.2f}",
             f"{e.moving_contact:.2f}",
             f"{e.danger:.0f}",
         )

@@ -99,7 +99,7 @@ def fixed(
     else:
         experiment = make(robot)
         report, log, files = _once(experiment, title, out, video, view, screen)
-        kept, near = report.kept, encounter(log, experiment.robot)
+        kept, near = report.kept, encounter(log, experiment)
         if json:
             print_json(report.to_dict() | {"encounter": near.to_dict()})
         else:

@@ -97,7 +97,7 @@ def path(
             with observed(experiment, out / "video.mp4", *shown, screen, progress, name, states) as (observer, _):
                 runs[name] = experiment.run_path(observer)
             found[name] = figures(runs[name], robot)
-            near[name] = encounter(runs[name].log, robot)
+            near[name] = encounter(runs[name].log, experiment)
             tag = name.replace(", ", "-").replace(" ", "-")
             runs[name].log.write_csv(out / f"signals-{tag}.csv")
             write_run(out / f"run-{tag}.npz", runs[name].log, settings_of(experiment), robot, states)
