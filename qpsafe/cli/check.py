@@ -40,7 +40,6 @@ def check(
     from qpsafe.check.report import to_dict
     from qpsafe.robot.loader import load_robot
     from qpsafe.sensing.cell_file import load_cell
-    from qpsafe.sim.drawing.checks import check_figure
     from qpsafe.tasks.program_file import ProgramError, load_program
 
     found, known = load_robot(robot), () if cell is None else load_cell(cell)
@@ -54,6 +53,8 @@ def check(
     result = check_path(found, plan, known=known, clearance=clearance)
     report = names | to_dict(result)
     if out is not None:
+        from qpsafe.sim.drawing.checks import check_figure
+
         out.mkdir(parents=True, exist_ok=True)
         check_figure(result, out / "check.png", f"{program.name}, {found.name}")
         write_text(out / "check.json", json_text(report) + "\n")

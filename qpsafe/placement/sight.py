@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
+from qpsafe.extras import require
 from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.surface import model_body
 from qpsafe.robot.hulls import solid_geoms
@@ -60,6 +61,7 @@ class SelfSight:
     """
 
     def __init__(self, robot: Robot, nearest: float, reach: float, opening: float) -> None:
+        require("place", "a choice of sensors", "mujoco")
         import mujoco
         import mujoco.batch
 

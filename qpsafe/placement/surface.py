@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import MissingExtraError, RobotFileError
+from qpsafe.errors import RobotFileError
+from qpsafe.extras import require
 from qpsafe.robot.mjcf import held_positions
 
 if TYPE_CHECKING:
@@ -135,11 +136,10 @@ def _read_mesh(region: Region) -> Array:
 
 
 def _trimesh(what: str) -> Any:
-    try:
-        import trimesh
-        import trimesh.creation
-    except ImportError as error:
-        raise MissingExtraError(f"{what} needs trimesh: pip install 'qpsafe[place]'") from error
+    require("place", what, "trimesh")
+    import trimesh
+    import trimesh.creation
+
     return trimesh
 
 

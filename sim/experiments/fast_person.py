@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qpsafe.sim.drawing.plots import STYLE, save
+from qpsafe.sim.drawing.plots import STYLE
 from qpsafe.sim.experiments.encounter import Encounter, encounter
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.path.experiment import PathExperiment
@@ -18,6 +18,7 @@ from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.replay.settings import Experiment
 from qpsafe.sim.stories.file import parse_story
 from qpsafe.sim.stories.story import Story
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from qpsafe.laws.problem import Law

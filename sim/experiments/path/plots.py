@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from qpsafe.danger.activation import Activation
-from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, save, shade
+from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, shade
 from qpsafe.sim.experiments.path.experiment import PathRun
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
