@@ -36,6 +36,17 @@ class Capsules(NamedTuple):
     adds: Array
 
 
+def joined(some: Capsules, others: Capsules) -> Capsules:
+    """All of them."""
+    return Capsules(
+        np.concatenate((some.bodies, others.bodies)),
+        some.names + others.names,
+        np.concatenate((some.ends, others.ends)),
+        np.concatenate((some.radii, others.radii)),
+        np.concatenate((some.adds, others.adds)),
+    )
+
+
 def capsules_of(hulls: Sequence[tuple[int, str, Array]]) -> Capsules:
     """Capsules around hulls that move; those of body 0, the base, approach nobody.
 

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.gate.capsules import Capsules, capsules_of
+from qpsafe.gate.capsules import Capsules, capsules_of, joined
 from qpsafe.gate.levers import levers
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.gate.tables import HEADER, lengths
@@ -52,9 +52,7 @@ class Group(NamedTuple):
 def robot_capsules(robot: Robot) -> Capsules:
     """Capsules that contain the robot's collision geometry, and the wire's links that have none; made once a robot."""
     if robot not in _capsules:
-        of_hulls, of_wire = capsules_of(body_hulls(robot)), bare_links(robot)
-        tables = zip(of_hulls, of_wire, strict=True)
-        _capsules[robot] = Capsules(*(a + b if isinstance(a, tuple) else np.concatenate((a, b)) for a, b in tables))
+        _capsules[robot] = joined(capsules_of(body_hulls(robot)), bare_links(robot))
     return _capsules[robot]
 
 

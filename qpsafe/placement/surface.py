@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from qpsafe.errors import RobotFileError
 from qpsafe.extras import require
 from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.mujoco_spec import mujoco_model
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -81,8 +82,8 @@ def model_body(model: Any, robot: Robot, frame: str) -> int:
 def _model_at_home(robot: Robot, frame: str) -> tuple[Any, Any, int]:
     import mujoco
 
+    model = mujoco_model(robot)
     try:
-        model = mujoco.MjModel.from_xml_path(str(robot.model_path))
         data = mujoco.MjData(model)
         addresses, values = held_positions(model, robot.held)
         data.qpos[addresses] = values
