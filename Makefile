@@ -9,7 +9,7 @@ SHARED := -n 2 --dist loadfile --no-loadscope-reorder
 # tests start dozens of Pythons: each would compile every source again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow dev lint docs figures bench clean
+.PHONY: demo test test-slow dev lint docs figures bench dist clean
 
 demo: $(VENV)/.demo ## the paper's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
@@ -50,6 +50,12 @@ bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical sol
 	$(BIN)/python benchmarks/bench_hqp.py --out bench-hqp.json
 	$(BIN)/python benchmarks/bench_gate.py bench-gate.json
 
+dist: $(VENV)/.dev ## sdist and wheel, checked as an index would
+	rm -rf dist
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[release]'
+	$(BIN)/python -m build
+	$(BIN)/python -m twine check --strict dist/*
+
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; ok = (3, 11) <= sys.version_info[:2] <= (3, 14); sys.exit(0 if ok else "qpsafe needs Python 3.11 to 3.14, found " + sys.version.split()[0] + "; try: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
@@ -71,4 +77,4 @@ $(VENV)/.bench: $(VENV)/bin/python pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build *.egg-info bench.json bench-compile.json bench-hqp.json
+	rm -rf $(VENV) out build dist *.egg-info bench.json bench-compile.json bench-hqp.json

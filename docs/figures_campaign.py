@@ -6,7 +6,8 @@ from pathlib import Path
 import matplotlib
 
 from qpsafe.sim.campaign.report.figures import harm_figure, kinds_figure
-from qpsafe.sim.drawing.plots import STYLE, save
+from qpsafe.sim.drawing.plots import STYLE
+from qpsafe.text.figure_file import save
 
 DOCS = Path(__file__).resolve().parent
 

@@ -226,9 +226,9 @@ class SafetyController(Running):
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
-        gated, gate = PASSED, self.verifies
+        gated, gate, doubts = PASSED, self.verifies, tuple[str, ...]()
         if gate is not None:
-            command = command.copy()
+            command, doubts = command.copy(), gate.notes()
             gated = gate(self._q, self._qd, command, seen.points, old)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
@@ -240,7 +240,7 @@ class SafetyController(Running):
             regime=regime,
             phase=recovery.phase,
             status=DEGRADED if messages else OK,
-            messages=messages,
+            messages=(*doubts, *messages),  # doubts about the model are no fault of this tick
             qd0=qd0,
             points=seen.points,
             links=seen.links,

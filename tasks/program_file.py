@@ -67,6 +67,17 @@ def load_program(path: str | Path, robot: Robot) -> Program:
     return _program(text.text, text.path, robot)
 
 
+def parse_program(text: str, name: str, robot: Robot) -> Program:
+    """A program from its text; see `load_program`.
+
+    Args:
+        text: TOML.
+        name: Of where it is from, for errors.
+        robot: Robot that is to follow it.
+    """
+    return _program(text, name, robot)
+
+
 @lru_cache(maxsize=8)
 def _program(said: str, path: str | Path, robot: Robot) -> Program:
     """What a file says, for a robot. Neither it nor a program ever changes: the last ones are not followed again."""

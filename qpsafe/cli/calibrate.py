@@ -10,6 +10,7 @@ import typer
 
 from qpsafe.cli.common import console, print_json, write_text
 from qpsafe.cli.outputs import DRAWN, output_file, try_file
+from qpsafe.extras import require
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -160,11 +161,12 @@ def _show(fits: list[Fit], tolerance: float, screen: Console) -> None:
 
 
 def _plot(fits: list[Fit], path: Path) -> None:
+    require("plots", "--plot", "matplotlib")
     import matplotlib
 
     matplotlib.use("Agg")
     from qpsafe.sensing.calibration_plot import calibration_figure
-    from qpsafe.sim.drawing.plots import save
+    from qpsafe.text.figure_file import save
 
     with matplotlib.rc_context({"savefig.dpi": 160}):
         save(calibration_figure(fits), path)

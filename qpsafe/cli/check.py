@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, print_json, verdict, write_text
+from qpsafe.cli.common import RobotName, console, print_json, verdict, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def check(
     program: Annotated[Path, typer.Argument(help="TOML file of what the tool does.")],
-    robot: Annotated[str, typer.Option(help="A bundled name, or a path to a robot folder.")] = "irb140",
+    robot: RobotName = "irb140",
     cell: Annotated[Path | None, typer.Option(help="TOML file of what stands in the cell by plan.")] = None,
     clearance: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="How far away what stands there is to be at least [m].")
@@ -40,7 +40,6 @@ def check(
     from qpsafe.check.report import to_dict
     from qpsafe.robot.loader import load_robot
     from qpsafe.sensing.cell_file import load_cell
-    from qpsafe.sim.drawing.checks import check_figure
     from qpsafe.tasks.program_file import ProgramError, load_program
 
     found, known = load_robot(robot), () if cell is None else load_cell(cell)
@@ -54,6 +53,8 @@ def check(
     result = check_path(found, plan, known=known, clearance=clearance)
     report = names | to_dict(result)
     if out is not None:
+        from qpsafe.sim.drawing.checks import check_figure
+
         out.mkdir(parents=True, exist_ok=True)
         check_figure(result, out / "check.png", f"{program.name}, {found.name}")
         write_text(out / "check.json", json_text(report) + "\n")

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from typer.core import TyperGroup
 
 from qpsafe.text.json_text import json_text
@@ -36,6 +37,9 @@ class ProjectionName(StrEnum):
 
     strict = "strict"
     paper = "paper"
+
+
+RobotName = Annotated[str, typer.Option(help="A bundled robot, a robot folder, MJCF or URDF, or PACKAGE:MODEL.")]
 
 
 class Group(TyperGroup):
@@ -144,12 +148,17 @@ def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: 
         screen: Where to.
         left_out: Promises that do not apply to this run, in words.
     """
+    from rich.text import Text
+
     from qpsafe.cli.sheet import Sheet
 
     sheet = Sheet(title, ("", "", "measured", "promised"), text=range(4))
     for check in checks:
-        sheet.add_row(verdict(check.kept), check.name, check.measured, check.promised)
+        word = verdict(check.kept) if check.counts else Text("as there" if check.kept else "not as there", "dim")
+        sheet.add_row(word, check.name, check.measured, check.promised)
     screen.print(sheet)
+    if not all(check.counts for check in checks):
+        screen.print("no promise: it depends on distances that were chosen for another robot", style="dim")
     if left_out:
         screen.print("left out, since nothing of the kind happened in so short a run:", style="yellow")
         for name in left_out:

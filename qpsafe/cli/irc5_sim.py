@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import SensorName, console, print_json, write_text
+from qpsafe.cli.common import RobotName, SensorName, console, print_json, write_text
 from qpsafe.cli.outputs import output_file
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def irc5_sim(
     experiment: Annotated[Experiment, typer.Option(help="What is played around the robot.")] = Experiment.fixed,
-    robot: Annotated[str, typer.Option(help="A bundled name, or a path to a robot folder.")] = "irb140",
+    robot: RobotName = "irb140",
     host: Annotated[str, typer.Option(help="Where qpsafe stream listens.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 6510,
     sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Where distances go; 0: nowhere.")] = 6511,
@@ -72,6 +72,7 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
+    from qpsafe.cli.demos.any_robot import READY, any_robot
     from qpsafe.irc5.axes import axes_of_robot
     from qpsafe.irc5.requests import Requests
     from qpsafe.robot.loader import load_robot
@@ -104,6 +105,8 @@ def irc5_sim(
     if lockstep and todo:
         raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
     found = load_robot(robot)
+    if found.spots_path is None:
+        found = any_robot("qpsafe irc5-sim", robot, READY / Path(robot).stem, screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(

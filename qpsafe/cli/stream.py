@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json
+from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, make_law, print_json
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
@@ -39,7 +39,7 @@ class Acknowledge(StrEnum):
 
 
 def stream(
-    robot: Annotated[str, typer.Option(help="A bundled name, or a path to a robot folder.")] = "irb140",
+    robot: RobotName = "irb140",
     host: Annotated[str, typer.Option(help="Address or interface of this computer that the robot speaks to.")] = (
         "127.0.0.1"
     ),
@@ -214,8 +214,12 @@ def _controller(
             raise ConfigurationError(
                 "qpsafe stream", "--experiment", experiment.value, "no --program, no --cell with it"
             )
+        from qpsafe.cli.demos.any_robot import READY, any_robot
         from qpsafe.sim.experiments.by_name import experiment_loop
 
+        if found.spots_path is None:
+            screen = console(True) if checked is None else checked.screen
+            found = any_robot("qpsafe stream", robot, READY / Path(robot).stem, screen)
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller
     known = () if cell is None else load_cell(cell)

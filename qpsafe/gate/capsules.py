@@ -1,4 +1,7 @@
-"""Capsules around a robot's collision hulls: what a person must not be touched by, a little larger than it is."""
+"""Capsules around a robot's collision hulls: what a person must not be touched by, a little larger than it is.
+
+Where the model has no collision geometry, they are those of the robot's wire, without thickness.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +36,17 @@ class Capsules(NamedTuple):
     adds: Array
 
 
+def joined(some: Capsules, others: Capsules) -> Capsules:
+    """All of them."""
+    return Capsules(
+        np.concatenate((some.bodies, others.bodies)),
+        some.names + others.names,
+        np.concatenate((some.ends, others.ends)),
+        np.concatenate((some.radii, others.radii)),
+        np.concatenate((some.adds, others.adds)),
+    )
+
+
 def capsules_of(hulls: Sequence[tuple[int, str, Array]]) -> Capsules:
     """Capsules around hulls that move; those of body 0, the base, approach nobody.
 
@@ -63,7 +77,7 @@ def _around(points: Array) -> list[tuple[Array, float, float]]:
     best: list[tuple[Array, float, float]] = []
     for count in range(1, PIECES + 1):
         pieces = _cut(points, count)
-        capsules = [(*_capsule(piece), piece) for piece in pieces]
+        capsules = [(*capsule_around(piece), piece) for piece in pieces]
         told = [(ends, radius, _adds(ends, radius, piece)) for ends, radius, piece in capsules]
         if not best or max(c[2] for c in told) < 0.8 * max(c[2] for c in best):
             best = told
@@ -105,8 +119,8 @@ def _axes(points: Array) -> Array:
     return axes
 
 
-def _capsule(points: Array) -> tuple[Array, float]:
-    """The smallest of some capsules around points: along each of their principal axes and the frame's."""
+def capsule_around(points: Array) -> tuple[Array, float]:
+    """Ends (2, 3), radius [m] of the smallest of some capsules around points: along their axes and the frame's."""
     best, ends, radius = np.inf, np.zeros((2, 3)), 0.0
     axes = np.vstack((_axes(points), np.eye(3)))
     for axis, centre, r in zip(axes, *_circles(points, axes), strict=True):

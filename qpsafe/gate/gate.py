@@ -11,7 +11,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.gate import workspace
 from qpsafe.gate.gate_kernel import CAUSE, PERSON_NEAR, POINT, SHARE, SHORT, TOLD, WHO, let_through
 from qpsafe.gate.gated import PASSED, Gated
-from qpsafe.gate.pack import pack, robot_capsules, surroundings
+from qpsafe.gate.pack import bare_links, pack, robot_capsules, surroundings
 from qpsafe.gate.rules import VerifiedMotion
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ class Gate(Fixed):
         self._room = -1
         self.blocks = pack(robot, (rules, limits, max_age), self.solids, self.groups)
         self._known = np.full(len(self.groups) * (1 + robot.nq), np.nan)  # nothing has been measured
+        self._unsaid = True
 
     def __call__(self, q: Array, qd: Array, command: Array, points: Array, ages: Array) -> Gated:
         """Replace a command (n,) [rad/s] by what of it can be let through.
@@ -65,6 +66,15 @@ class Gate(Fixed):
             self._make_room(len(points))
         share = let_through(*self.blocks, self._known, *self._work, q, qd, command, points, ages, self._told)
         return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
+
+    def notes(self) -> tuple[str, ...]:
+        """What is doubtful about what it measures by, in words; said once."""
+        bare, unsaid = bare_links(self.robot).names, self._unsaid
+        self._unsaid = False
+        if not (unsaid and bare):
+            return ()
+        return (f"the model has no collision geometry here: only a line without thickness is kept from people, along "
+                f"{', '.join(bare)}",)  # fmt: skip
 
     @property
     def sizes(self) -> tuple[int, int, int]:

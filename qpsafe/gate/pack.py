@@ -9,10 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.gate.capsules import Capsules, capsules_of
+from qpsafe.gate.capsules import Capsules, capsules_of, joined
 from qpsafe.gate.levers import levers
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.gate.tables import HEADER, lengths
+from qpsafe.gate.wire_capsules import wire_capsules
 from qpsafe.geometry.layout import BODY, POSE, SIZE, VERTEX, VERTICES
 from qpsafe.geometry.solids import Solids
 from qpsafe.sensing.body import body_hulls
@@ -31,6 +32,7 @@ FARTHEST = 0.4  # larger distances of solids are not measured [m]
 MOST = 16  # cells that are kept a robot
 _surroundings: WeakKeyDictionary[Robot, OrderedDict[Any, Any]] = WeakKeyDictionary()
 _capsules: WeakKeyDictionary[Robot, Capsules] = WeakKeyDictionary()
+_bare: WeakKeyDictionary[Robot, Capsules] = WeakKeyDictionary()
 
 
 class Group(NamedTuple):
@@ -48,10 +50,19 @@ class Group(NamedTuple):
 
 
 def robot_capsules(robot: Robot) -> Capsules:
-    """Capsules that contain the robot's collision geometry; made once a robot."""
+    """Capsules that contain the robot's collision geometry, and the wire's links that have none; made once a robot."""
     if robot not in _capsules:
-        _capsules[robot] = capsules_of(body_hulls(robot))
+        _capsules[robot] = joined(capsules_of(body_hulls(robot)), bare_links(robot))
     return _capsules[robot]
+
+
+def bare_links(robot: Robot) -> Capsules:
+    """Capsules of those links of the robot's wire whose body has no collision geometry."""
+    if robot not in _bare:
+        shaped = {body for body, _, _ in body_hulls(robot)}
+        tree = set(range(1, robot.nq + 1))
+        _bare[robot] = wire_capsules(robot, tree - shaped) if tree - shaped else capsules_of([])
+    return _bare[robot]
 
 
 def surroundings(

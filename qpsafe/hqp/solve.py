@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.packing import Packed, pack, unpack
 from qpsafe.hqp.solution import (
@@ -100,6 +101,16 @@ def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array
     return near
 
 
+def require_solver(solver: str | None) -> None:
+    """Say at once where a solver is not installed that only an extra brings.
+
+    Raises:
+        MissingExtraError: Names the extra.
+    """
+    if solver == "proxqp":
+        require("proxqp", 'solver = "proxqp"', "proxsuite")
+
+
 def _own(problem: Packed, begin: float, damping: Array | None = None, note: str = "") -> Solution:
     """Solve with the own solver."""
     global _solve_packed
@@ -128,6 +139,7 @@ def note_of(status: str, where: int, problem: Packed) -> str:
 
 def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
     """Solve with somebody else's solver; the own one judges the result, and answers where it fails."""
+    require_solver(solver)
     backend = "" if solver in ("daqp", "proxqp") else _backend(solver)
     own = _own(problem, begin)
     if own.status in (INVALID_DATA, INVALID_LIMITS, FAILED):

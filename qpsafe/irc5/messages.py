@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import MissingExtraError, QpsafeError
+from qpsafe.errors import QpsafeError
+from qpsafe.extras import require
 from qpsafe.irc5.axes import Axes, axes_of
 
-try:
-    _wire: Any = import_module("qpsafe.irc5.qpsafe_egm_pb2")
-except ImportError as error:  # pragma: no cover (the tests have it)
-    raise MissingExtraError(f"EGM needs protobuf: pip install 'qpsafe[irc5]' ({error})") from error
+require("irc5", "EGM", "google.protobuf")
+_wire: Any = import_module("qpsafe.irc5.qpsafe_egm_pb2")
 
 #: EGM's port, unless the robot's configuration says otherwise.
 DEFAULT_PORT = 6510

@@ -16,7 +16,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
-from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.hqp.solve import require_solver, solve_hierarchy
 from qpsafe.laws.damping import DAMPING_TIME, threshold
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.text.words import call
@@ -74,6 +74,7 @@ class HierarchicalLaw(Fixed):
                 raise ConfigurationError("HierarchicalLaw", key, value, "a finite number >= 0")
             if value > 0.0 and not own:
                 raise ConfigurationError("HierarchicalLaw", key, value, f"0 with solver {solver!r}")
+        require_solver(solver)
         self.projection = projection
         self.solver = solver
         # compile now if need be, not within the first tick

@@ -14,7 +14,7 @@ from qpsafe.compiled.compiled import inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
-from qpsafe.hqp.solve import solve_hierarchy
+from qpsafe.hqp.solve import require_solver, solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.text.words import call, counted
 
@@ -43,6 +43,7 @@ class WeightedLaw(Fixed):
             raise ConfigurationError("WeightedLaw", "ratio", ratio, "a finite number > 1")
         if weights is not None and not (len(weights) > 0 and all(0.0 < w < math.inf for w in weights)):
             raise ConfigurationError("WeightedLaw", "weights", weights, "finite numbers > 0: w_1, ..., w_N, w_E")
+        require_solver(solver)
         self.ratio = ratio
         self.weights = None if weights is None else tuple(map(float, weights))
         self.solver = solver

@@ -13,6 +13,7 @@ from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.pipeline.checks import check_command
 from qpsafe.pipeline.resolve import Array, Resolve, Resolved
 from qpsafe.pipeline.sense import Seen, Sense
+from qpsafe.sensing.body import body_hulls
 
 if TYPE_CHECKING:
     from qpsafe.danger.evasion import Evasion
@@ -114,7 +115,7 @@ class Stages:
         """Capsules around the robot's links; those of its wire where its model has no collision geometry."""
         from qpsafe.gate.pack import robot_capsules
 
-        capsules = robot_capsules(self._robot)
-        if not len(capsules.radii):
+        if not body_hulls(self._robot):
             return LinkParts.wire(self._robot)
+        capsules = robot_capsules(self._robot)
         return LinkParts(capsules.names, np.repeat(capsules.bodies, 2), capsules.ends, capsules.radii)

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
+from qpsafe.extras import require
 from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.surface import model_body
 from qpsafe.robot.hulls import solid_geoms
 from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.mujoco_spec import mujoco_model
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -60,14 +62,15 @@ class SelfSight:
     """
 
     def __init__(self, robot: Robot, nearest: float, reach: float, opening: float) -> None:
+        require("place", "a choice of sensors", "mujoco")
         import mujoco
         import mujoco.batch
 
         self.robot, self.opening = robot, opening
         self.nearest, self.reach = nearest + MARGIN, max(reach, nearest + MARGIN)
         self._frames: dict[str, Array] = {}
+        self._model: Any = mujoco_model(robot)
         try:
-            self._model: Any = mujoco.MjModel.from_xml_path(str(robot.model_path))
             self._q = np.array([self._model.joint(name).qposadr[0] for name in robot.joint_names], dtype=np.intp)
         except (ValueError, KeyError) as error:
             expected = f"a model that MuJoCo can read ({error})"

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import MissingExtraError, RobotFileError
+from qpsafe.errors import RobotFileError
+from qpsafe.extras import require
 from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.mujoco_spec import mujoco_model
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -80,8 +82,8 @@ def model_body(model: Any, robot: Robot, frame: str) -> int:
 def _model_at_home(robot: Robot, frame: str) -> tuple[Any, Any, int]:
     import mujoco
 
+    model = mujoco_model(robot)
     try:
-        model = mujoco.MjModel.from_xml_path(str(robot.model_path))
         data = mujoco.MjData(model)
         addresses, values = held_positions(model, robot.held)
         data.qpos[addresses] = values
@@ -135,11 +137,10 @@ def _read_mesh(region: Region) -> Array:
 
 
 def _trimesh(what: str) -> Any:
-    try:
-        import trimesh
-        import trimesh.creation
-    except ImportError as error:
-        raise MissingExtraError(f"{what} needs trimesh: pip install 'qpsafe[place]'") from error
+    require("place", what, "trimesh")
+    import trimesh
+    import trimesh.creation
+
     return trimesh
 
 

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import mink
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.geometry.clearance import MARGIN
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, mujoco_joints
@@ -19,6 +19,9 @@ from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, chec
 from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
+
+require("mink", "qpsafe.plugins.mink", "mink")
+import mink  # noqa: E402
 
 Array = NDArray[np.float64]
 

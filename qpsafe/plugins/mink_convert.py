@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mink
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +13,8 @@ from qpsafe.plugins.joints import mujoco_joints
 from qpsafe.plugins.mink import ClikTask
 from qpsafe.robot.robot import Robot
 from qpsafe.tasks.task import Task
+
+import mink  # isort: skip  after qpsafe.plugins.mink, which says what is missing
 
 __all__ = ["from_mink", "to_mink"]
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.geometry.clearance import MARGIN
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, pinocchio_joints
@@ -18,12 +19,10 @@ from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
 
-try:
-    from pink.barriers import Barrier as PinkBarrier
-    from pink.limits import Limit as PinkLimit
-    from pink.tasks import Task as PinkTask
-except ImportError as error:
-    raise MissingExtraError(f"pink is not installed: pip install 'qpsafe[pink]' ({error})") from error
+require("pink", "qpsafe.plugins.pink", "pink")
+from pink.barriers import Barrier as PinkBarrier  # noqa: E402
+from pink.limits import Limit as PinkLimit  # noqa: E402
+from pink.tasks import Task as PinkTask  # noqa: E402
 
 Array = NDArray[np.float64]
 

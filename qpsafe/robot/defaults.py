@@ -20,6 +20,8 @@ FULL_SPEED_TIME = 0.25
 DEFAULT_MAX_VELOCITY = 1.0
 #: The same of a joint that slides [m/s].
 DEFAULT_MAX_SPEED = 0.25
+#: How the note of a robot begins whose file states no home pose.
+HOMELESS = "no home pose is stated"
 _NO_LIMIT = 1e6  # readers write huge numbers, or zero, for "no limit"
 
 
@@ -68,7 +70,7 @@ def spec_from_model(path: Path, file: ModelFile, given: dict[str, ArrayLike]) ->
         if not low <= value <= high:
             raise RobotFileError(path, f"{name}.home", float(value), f"within {low:g} to {high:g} rad")
     if "home" not in given and not file.home:
-        notes.append("no home pose is stated: all joints at zero, moved inside their limits")
+        notes.append(f"{HOMELESS}: all joints at zero, moved inside their limits")
     return RobotSpec(
         name=model.name or path.stem,
         title=model.name or path.stem,

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from qpsafe.errors import RobotFileError
+from qpsafe.extras import require
 from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint, HeldJoint
 
 #: Range of a joint that turns without end, either way: so far that it is never met, and a finite number [rad].
@@ -65,6 +66,7 @@ def compile_mjcf(path: Path, root: Element) -> Compiled:
     Raises:
         RobotFileError: Names the element that is wrong, in MuJoCo's words where it found it.
     """
+    require("mjcf", "an MJCF file", "mujoco")
     import mujoco
 
     for element in root.iter():

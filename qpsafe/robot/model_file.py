@@ -63,6 +63,15 @@ def read_model(
     return _read_mjcf(path, root, hold or {}, units, wanted)
 
 
+def is_urdf(path: Path) -> bool:
+    """Whether a model file is URDF, whatever its name ends in.
+
+    Raises:
+        RobotFileError: It is neither URDF nor MJCF.
+    """
+    return _parse(path).tag == "robot"
+
+
 def read_bundled(path: Path) -> ModelFile:
     """The MJCF of a bundled robot by pinocchio's own reader: no MuJoCo is needed to control a robot.
 

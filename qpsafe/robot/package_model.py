@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePath
 
 from qpsafe.errors import MissingExtraError, RobotFileError
+from qpsafe.extras import require
 
 PACKAGES = ("robot_descriptions", "example_robot_data")
 
@@ -34,8 +35,7 @@ def find_package_model(name: str) -> Path:
 
 
 def _from_robot_descriptions(name: str, model: str) -> Path:
-    if importlib.util.find_spec("robot_descriptions") is None:
-        raise MissingExtraError(f"{name} needs robot_descriptions: pip install 'qpsafe[models]'")
+    require("models", name, "robot_descriptions")
     module = f"robot_descriptions.{model}"
     if not model.isidentifier() or importlib.util.find_spec(module) is None:
         expected = "robot_descriptions:MODULE, e.g. panda_description, ur5_description, iiwa14_description"

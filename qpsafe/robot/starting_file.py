@@ -6,27 +6,43 @@ import math
 import os
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.robot.defaults import HOMELESS
 from qpsafe.robot.robot import Robot
 
 
-def starting_robot_toml(robot: Robot, folder: Path) -> str:
+def starting_robot_toml(
+    robot: Robot,
+    folder: Path,
+    *,
+    home: NDArray[np.float64] | None = None,
+    max_acceleration: NDArray[np.float64] | None = None,
+    spots: str | None = None,
+) -> str:
     """The text of a robot.toml that says what was found in a bare model file and what was assumed.
 
     Args:
         robot: Loaded from the model file alone.
         folder: Where the file will stand; the model is named relative to it where it is below.
+        home: Another home pose than the robot's (n,) [rad].
+        max_acceleration: Other acceleration limits than the robot's (n,) [rad/s²].
+        spots: File of distance sensors beside it, if there is one.
     """
     model = robot.model_path.resolve()
     name = os.path.relpath(model, folder.resolve()) if folder.resolve() in model.parents else str(model)
     lines = [
         f"# {robot.title}: written by `qpsafe robots add` from {robot.model_path.name}. Check every value, above all:",
-        *(f"# - {note}" for note in robot.notes),
+        *(f"# - {note}" for note in robot.notes if home is None or not note.startswith(HOMELESS)),
         "",
         f"name = {_text(robot.name)}",
         f"title = {_text(robot.title)}",
         f"model = {_text(name)}",
-        '# spots = "spots.toml"             # distance sensors, if it carries any',
-        f"home = [{', '.join(map(_figure, robot.home, robot.sliding))}]",
+        '# spots = "spots.toml"             # distance sensors, if it carries any'
+        if spots is None
+        else f"spots = {_text(spots)}",
+        f"home = [{', '.join(map(_figure, robot.home if home is None else home, robot.sliding))}]",
         "",
         "[units]",
         'length = "m"',
@@ -35,10 +51,13 @@ def starting_robot_toml(robot: Robot, folder: Path) -> str:
         'time = "s"',
         "",
     ]
+    limits = {key: getattr(robot, key) for key in ("lower", "upper", "max_velocity", "max_acceleration")}
+    if max_acceleration is not None:
+        limits["max_acceleration"] = max_acceleration
     for i, joint in enumerate(robot.joint_names):
         lines += [f"[joints.{_text(joint)}]"]
-        for key in ("lower", "upper", "max_velocity", "max_acceleration"):
-            lines += [f"{key} = {_figure(getattr(robot, key)[i], robot.sliding[i])}"]
+        for key in limits:
+            lines += [f"{key} = {_figure(limits[key][i], robot.sliding[i])}"]
         lines += [""]
     if robot.held:
         lines += ["# Joints that are held in place, and where (angle or length).", "[hold]"]

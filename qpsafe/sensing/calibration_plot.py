@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from qpsafe.extras import require
 from qpsafe.sensing.calibration import FITTED, Fit
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 def calibration_figure(fits: Sequence[Fit]) -> Figure:
     """Curves of all spots on the left, residuals in distance on the right."""
+    require("plots", "a figure", "matplotlib")
     import matplotlib
     from matplotlib.figure import Figure
 

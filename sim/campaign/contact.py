@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.harm import blow, effective_mass
+from qpsafe.sim.world.contact_point import contact_point
 from qpsafe.sim.world.rays import cast
 from qpsafe.sim.world.scene import ROBOT_COLLISION, SCENERY
 
@@ -61,13 +62,9 @@ def described(run: Recording, station: Station, tracks: PersonTracks, before: To
         seen: Points that counted then (p, 3) [m].
     """
     robot, k = station.robot, before.k
-    state = robot.at(run.q[k])
-    away = before.on_person - before.on_robot
-    # towards the person; where they overlap already, the nearest points lie the other way round
-    normal = np.copysign(1.0, before.distance) * away / max(float(np.linalg.norm(away)), 1e-12)
-    J = point_jacobian(state, before.body, before.on_robot)
-    velocity = J @ run.qd[k]
-    towards = float(velocity @ normal)
+    pair = before.on_robot, before.on_person
+    point = contact_point(robot.at(run.q[k]), run.qd[k], before.body, pair, before.distance)
+    (J, velocity, normal), towards = point, point.towards
     closing = towards - float(_velocity(tracks, k, before.segment, before.on_person) @ normal)
     clamped = towards > MOVING and _blocked(station, run.q[k], tracks, before, normal)
     region = part_name(tracks, before.segment)
@@ -129,20 +126,6 @@ def classified(speed: float, towards: float, clamped: bool) -> str:
     if towards > TOWARDS:
         return "towards"
     return "away" if towards < -TOWARDS else "sideways"
-
-
-def point_jacobian(state: Any, body: int, point: Array) -> Array:
-    """Linear Jacobian (3, n) of the point of a body that is at `point` now (3,).
-
-    Args:
-        state: Of the robot.
-        body: As in its tree, 0 for the base.
-        point: (3,) [m].
-    """
-    n = state.robot.nq
-    twists = state.memory[16 * (n + 1) : 16 * (n + 1) + 6 * n].reshape(6, n)
-    linear = twists[:3] + np.cross(twists[3:], point, axis=0)  # v + ω × p
-    return np.asarray(state.robot.tree.supports[body] * linear)
 
 
 def _blocked(station: Station, q: Array, tracks: PersonTracks, before: Touch, normal: Array) -> bool:

@@ -15,7 +15,8 @@ from contextlib import contextmanager, suppress
 from threading import Thread
 from typing import Any, Protocol, TypeVar
 
-from qpsafe.errors import ConfigurationError, MissingExtraError, QpsafeError
+from qpsafe.errors import ConfigurationError, QpsafeError
+from qpsafe.extras import require
 
 Piece = TypeVar("Piece")
 Answer = TypeVar("Answer")
@@ -231,11 +232,10 @@ def dask_executor(address: str) -> Iterator[Executor]:
         MissingExtraError: `distributed` is not installed.
         ConfigurationError: Nobody answers there.
     """
-    try:
-        from distributed import Client
-        from distributed.comm import get_address_host
-    except ImportError as error:
-        raise MissingExtraError(f"--dask needs distributed: pip install distributed ({error})") from error
+    require("dask", "--dask", "distributed")
+    from distributed import Client
+    from distributed.comm import get_address_host
+
     try:
         get_address_host(address)  # a client that has refused its address takes half a minute to be forgotten
         client = Client(address, timeout=10, set_as_default=False)

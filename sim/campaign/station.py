@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,14 +22,15 @@ from qpsafe.sim.campaign.servo import OMEGA
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.fixed.stage import robot_stage
-from qpsafe.sim.experiments.pick_place.cell import PROGRAM as PICK
+from qpsafe.sim.experiments.path.for_robot import line_for
 from qpsafe.sim.experiments.pick_place.cell import Cell
+from qpsafe.sim.experiments.pick_place.for_robot import work_for
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.program import Program
-from qpsafe.tasks.program_file import load_program
+from qpsafe.tasks.program_file import ProgramError, load_program, parse_program
 from qpsafe.tasks.reach import joints_for
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LINE = Path(__file__).with_name("line.toml")
+RATES = (0.5, 2.0, 20.0)  # of that line, for robots that cannot follow it where it is [m/s, m/s², m/s³]
 #: Motions that have a name; any other is the path of a program's file.
 MOTIONS = ("hold", "line", "pick")
 #: How late sensors are: a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s].
@@ -67,12 +69,12 @@ class Station:
     @cached_property
     def cell(self) -> Cell | None:
         """Tables, support and box of the third experiment, without screws; None where nothing but the pedestal is."""
-        return Cell(full=0) if self.motion == "pick" else None
+        return replace(work_for(self.robot).cell, full=0) if self.motion == "pick" else None
 
     @cached_property
     def pedestal(self) -> float:
         """Height of the robot's base above the floor [m]."""
-        return robot_stage(self.robot).pedestal
+        return work_for(self.robot).pedestal if self.motion == "pick" else robot_stage(self.robot).pedestal
 
     @cached_property
     def scene(self) -> Scene:
@@ -121,7 +123,18 @@ class Station:
         """What the first tool follows; None where it stays where it is."""
         if self.motion == "hold":
             return None
-        return load_program({"line": LINE, "pick": PICK}.get(self.motion, Path(self.motion)), self.robot)
+        if self.motion not in MOTIONS:
+            return load_program(Path(self.motion), self.robot)
+        if self.motion == "pick":
+            text = work_for(self.robot).program
+        else:
+            text = LINE.read_text(encoding="utf-8")
+        try:
+            return parse_program(text, f"the motion {self.motion!r}", self.robot)
+        except ProgramError:
+            if self.motion == "pick":
+                raise
+            return parse_program(line_for(self.robot, RATES), f"the motion {self.motion!r}", self.robot)
 
     @property
     def reference(self) -> Trajectory:

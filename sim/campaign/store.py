@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.rows import COLUMNS, DTYPES, NAMES, Columns, joined
 from qpsafe.text.json_text import json_text
@@ -191,11 +192,10 @@ def _reading(file: Path) -> Iterator[None]:
 
 
 def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise MissingExtraError(f"to keep trials needs pyarrow: pip install 'qpsafe[campaign]' ({error})") from error
+    require("campaign", "a folder of trials", "pyarrow")
+    import pyarrow
+    import pyarrow.parquet
+
     return pyarrow, pyarrow.parquet
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import MissingExtraError
+from qpsafe.extras import require
 from qpsafe.sim.drawing.overlay import danger_colour
 
 HEIGHT = 66  # of the strip, in pixels of a 960 pixel wide frame
@@ -49,11 +49,9 @@ class CaptionStrip:
         Raises:
             MissingExtraError: pillow is not installed.
         """
-        try:
-            from PIL import Image, ImageDraw, ImageFont
-        except ImportError as error:
-            raise MissingExtraError("captions need pillow: pip install 'qpsafe[video]'") from error
+        require("video", "a caption", "PIL")
         import matplotlib
+        from PIL import Image, ImageDraw, ImageFont
 
         fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
         self._scale = s = width / 960

@@ -9,7 +9,8 @@ import numpy as np
 
 from qpsafe.check.joints import position_margins
 from qpsafe.check.singular import SINGULAR
-from qpsafe.sim.drawing.plots import plain, save
+from qpsafe.sim.drawing.plots import plain
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.activation import Activation
 from qpsafe.sim.recording.log import RunLog
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,13 +141,3 @@ def _figure(rows: int, width: float, height: float, ratios: tuple[float, ...] | 
 def plain(text: str) -> str:
     """A name from a file for a figure: matplotlib takes what stands between dollars for mathematics."""
     return text.replace("$", r"\$")
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write whole or not at all."""
-    part = path.with_name("." + path.name)
-    try:
-        figure.savefig(part, format=path.suffix.lstrip("."))
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.sim.drawing.caption import Caption, CaptionStrip
 from qpsafe.sim.drawing.gl import gl_available, make_context
 from qpsafe.sim.drawing.overlay import DangerOverlay
@@ -110,13 +111,10 @@ class VideoWriter:
             raise ConfigurationError("VideoWriter", "path", str(path), "a name that ends in .mp4")
         if not 1 <= fps <= 120:
             raise ConfigurationError("VideoWriter", "fps", fps, "1 to 120 frames a second")
-        try:
-            import imageio.v2 as imageio
+        # imageio would find ffmpeg by itself, but say late and unclearly that it cannot
+        require("video", "a video", "imageio.v2", "imageio_ffmpeg")
+        import imageio.v2 as imageio
 
-            # imageio would find it by itself, but say so late and unclearly if it cannot
-            import imageio_ffmpeg  # type: ignore[import-untyped]  # noqa: F401
-        except ImportError as error:
-            raise MissingExtraError("videos need imageio and ffmpeg: pip install 'qpsafe[video]'") from error
         self._open_file = imageio.get_writer
         self._strip = CaptionStrip(size[0])
         self.scene, self.fps, self.size = scene, fps, size

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, plain, save, shade
+from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, plain, shade
 from qpsafe.sim.recording.log import RunLog
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from qpsafe.sim.stories.story import Story

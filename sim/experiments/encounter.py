@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.recording.log import RunLog
+from qpsafe.sim.world.contact_point import contact_point
+from qpsafe.sim.world.distance import TrueDistances
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
+    from qpsafe.sim.replay.settings import Experiment
 
 MOVING = 1e-3  # below this the robot counts as standing [m/s]
 
@@ -28,6 +33,8 @@ class Encounter:
         fastest_in_contact: Of the robot's fastest point while they touched [m/s]; None if never.
         moving_contact: How long they touched while the robot moved faster than 1 mm/s [s].
         danger: Largest CDF_n.
+        towards_speed: Of the robot's contact point towards the person or board one tick before contact, negative where
+            it goes away [m/s]; None if they never touched.
     """
 
     distance: float
@@ -38,6 +45,7 @@ class Encounter:
     fastest_in_contact: float | None
     moving_contact: float
     danger: float
+    towards_speed: float | None
 
     def sentence(self) -> str:
         """The encounter in words."""
@@ -57,8 +65,14 @@ class Encounter:
         return asdict(self)
 
 
-def encounter(log: RunLog, robot: Robot) -> Encounter:
-    """Measure a run; people and boards are not pushed away by the robot, nor it by them."""
+def encounter(log: RunLog, experiment: Experiment) -> Encounter:
+    """Measure a run; people and boards are not pushed away by the robot, nor it by them.
+
+    Args:
+        log: The run.
+        experiment: Of which it is.
+    """
+    robot = experiment.robot
     gap = np.minimum(log.person_distance, log.board_distance)
     nearest = int(gap.argmin())
     touching = np.flatnonzero(gap <= 0.0)
@@ -73,7 +87,22 @@ def encounter(log: RunLog, robot: Robot) -> Encounter:
         fastest_in_contact=max(speeds) if speeds else None,
         moving_contact=log.dt * sum(speed > MOVING for speed in speeds),
         danger=float(np.nanmax(log.cdf_n)),
+        towards_speed=_towards(log, experiment, max(first - 1, 0)) if len(touching) else None,
     )
+
+
+def _towards(log: RunLog, experiment: Experiment, k: int) -> float:
+    """Speed of the robot's nearest point towards whom it is nearest to, at a tick [m/s].
+
+    Where everybody was then follows from the experiment; the log has no room for it.
+    """
+    scene = experiment.scene
+    data = scene.make_data(log.q[k])
+    people = experiment.people if isinstance(experiment, PickPlaceExperiment) else experiment.walk.people
+    scene.place_people(data, PosesAhead(people, log.dt)(k))
+    near = min(TrueDistances(scene).measure(data), key=lambda found: found.distance)
+    state, pair = experiment.robot.at(log.q[k]), (near.on_robot, near.on_other)
+    return contact_point(state, log.qd[k], near.body, pair, near.distance).towards
 
 
 def fastest_point(robot: Robot, q: np.ndarray, qd: np.ndarray) -> float:

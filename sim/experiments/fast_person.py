@@ -9,15 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qpsafe.sim.drawing.plots import STYLE, save
+from qpsafe.sim.drawing.plots import STYLE
 from qpsafe.sim.experiments.encounter import Encounter, encounter
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.experiments.pick_place.for_robot import work_for
 from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.replay.settings import Experiment
 from qpsafe.sim.stories.file import parse_story
 from qpsafe.sim.stories.story import Story
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from qpsafe.laws.problem import Law
@@ -44,10 +47,13 @@ class FastRun:
         return {"experiment": self.experiment, "speed": self.speed, **self.encounter.to_dict()}
 
 
-def at_speed(speed: float) -> Story:
-    """The bundled story at another walking speed [m/s], to the end of the time that they stand at the pedestal."""
+def at_speed(speed: float, floor: float = -0.55) -> Story:
+    """The bundled story at another walking speed [m/s], to the end of the time that they stand at the pedestal.
+
+    The floor is where the robot's pedestal stands [m].
+    """
     text = STORY.read_text(encoding="utf-8").replace("speed = 2.0", f"speed = {speed!r}", 1)
-    story = parse_story(text, STORY)
+    story = parse_story(text, STORY, floor=floor)
     story.duration = story.people[0].steps[2].end
     return story
 
@@ -73,9 +79,14 @@ def runs(
     """
     for name in names:
         for speed in speeds:
-            built = experiment_with(name, at_speed(speed), robot, law, lag)
+            built = experiment_with(name, at_speed(speed, -pedestal_of(name, robot)), robot, law, lag)
             log = _run(built, None if observer is None else observer(name, speed, built))
-            yield FastRun(name, speed, encounter(log, robot), built, log)
+            yield FastRun(name, speed, encounter(log, built), built, log)
+
+
+def pedestal_of(name: str, robot: Robot) -> float:
+    """How high the robot stands in an experiment of `EXPERIMENTS` [m]."""
+    return robot_stage(robot).pedestal if name != "pick-and-place" else work_for(robot).pedestal
 
 
 def experiment_with(name: str, story: Story, robot: Robot, law: Law | None = None, lag: float = 0.0) -> Experiment:

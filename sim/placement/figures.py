@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from qpsafe.placement.statistics import clopper_pearson
-from qpsafe.sim.drawing.plots import plain, save
+from qpsafe.sim.drawing.plots import plain
+from qpsafe.text.figure_file import save
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:

@@ -126,7 +126,7 @@ def _model(robot: Robot, shown: SpotArray, q: NDArray, with_directions: bool, wi
         <geom type="plane" size="20 20 0.1" material="floor"/>
       </worldbody>
     </mujoco>""")
-    spec.attach(robot_spec(robot), frame=spec.worldbody.add_frame(), prefix="robot/")
+    spec.attach(robot_spec(robot)[0], frame=spec.worldbody.add_frame(), prefix="robot/")
     origins, directions = shown.rays(robot.at(q))
     looks: dict[str, Any] = {"contype": 0, "conaffinity": 0, "group": 1, "rgba": SPOT if with_directions else NODE}
     sphere, capsule = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE

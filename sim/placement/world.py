@@ -61,7 +61,7 @@ class PlacementWorld:
             size = [segment.radius, segment.length / 2, 0.0]
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=size, group=DUMMY, contype=_DUMMY_BIT, conaffinity=0)
         try:
-            own = robot_spec(robot)
+            own = robot_spec(robot)[0]
             for geom in own.geoms:  # what collides of the robot touches the dummy and the ground
                 if geom.group == ROBOT_COLLISION:
                     geom.conaffinity = int(geom.conaffinity) | _DUMMY_BIT | _GROUND_BIT

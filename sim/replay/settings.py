@@ -52,7 +52,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         )
     robot, story = experiment.robot, experiment.story
     found: dict[str, Any] = {
-        "robot": robot.name if robot.name in bundled_robots() else str(robot.folder),
+        "robot": _found_by(robot),
         "spots": _spots(robot),
         "law": law_settings(experiment.law),
         "rules": None if experiment.rules is None else asdict(experiment.rules),
@@ -99,6 +99,13 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
     except (KeyError, TypeError, AttributeError) as problem:
         raise ConfigurationError("the recorded settings", str(problem), None, "a complete set") from None
     raise ConfigurationError("the recorded settings", "kind", settings["kind"], f"fixed, path or {KIND}")
+
+
+def _found_by(robot: Robot) -> str:
+    """What `load_robot` finds the robot by: a bundled name, its folder, or its model file."""
+    if robot.name in bundled_robots():
+        return robot.name
+    return str((robot.folder if (robot.folder / "robot.toml").is_file() else robot.model_path).resolve())
 
 
 def _spots(robot: Robot) -> str | None:

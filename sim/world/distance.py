@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.geometry.layout import BODY
 from qpsafe.sim.engine.tracks import people_of
 from qpsafe.sim.engine.world import World
 
@@ -27,11 +28,13 @@ class Distance(NamedTuple):
         distance: Negative when the two overlap, +inf if there is no other [m].
         on_robot: Nearest point of the robot, world frame, (3,) [m].
         on_other: Nearest point of the board or the person, (3,) [m].
+        body: Body of the robot's tree that the point is on, 0 for the base; -1 for none.
     """
 
     distance: float
     on_robot: Array
     on_other: Array
+    body: int
 
 
 class TrueDistances:
@@ -61,7 +64,10 @@ class TrueDistances:
                 (ends, radii, balls, boards[:0], half_sizes[:0]),
             )
         )
-        board, person = (Distance(nearest.distance, nearest.on_robot, nearest.on_other) for nearest in found)
+        owners = measured.world.index[:, BODY]
+        board, person = (
+            Distance(n.distance, n.on_robot, n.on_other, int(owners[n.shape]) if n.shape >= 0 else -1) for n in found
+        )
         return board, person
 
     def board(self, data: Any) -> Distance:

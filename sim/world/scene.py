@@ -48,8 +48,9 @@ class Scene:
         robot_geoms: Collision geoms of the robot (group 3).
         person_geoms: Geom of each segment of everybody, person by person in the order of `SEGMENTS`, (17 p,).
         board_geoms: Geom of each board, (b,).
-        tcp_site: Site at the tip of the tool, -1 if the robot has none.
+        tcp_site: Site at the tip of the (first) tool, z pointing out of it, -1 if the robot has none.
         pedestal: Height of the robot's base above the floor [m].
+        said: What the robot's model lacked and was given, in words.
     """
 
     model: Any
@@ -63,6 +64,7 @@ class Scene:
     board_geoms: NDArray[np.intp]
     tcp_site: int
     pedestal: float
+    said: tuple[str, ...] = ()
 
     def make_data(self, q: NDArray[np.float64] | None = None) -> Any:
         """Fresh MjData: the robot at rest at q (default its home), the person far away, kinematics computed."""
@@ -117,7 +119,7 @@ def build_scene(
     """Build the world around a robot.
 
     Args:
-        robot: From `load_robot`; its model needs one motor per joint, named like the joint.
+        robot: From `load_robot`. What its model lacks, motors for example, is added; `Scene.said` names it.
         timestep: Of the physics [s].
         pedestal: Height of the robot's base above the floor [m].
         board: Size of the card board and how it is held, for the one person of the paper's experiments.
@@ -143,7 +145,8 @@ def build_scene(
     _set_options(spec, timestep, contacts)
     add_surroundings(spec, pedestal)
     names = [_add_person(spec, person, k) for k, person in enumerate(everybody)]
-    spec.attach(robot_spec(robot), prefix="robot/", frame=spec.worldbody.add_frame())
+    body, said = robot_spec(robot)
+    spec.attach(body, prefix="robot/", frame=spec.worldbody.add_frame())
     if furnish is not None:
         furnish(spec)
     model = spec.compile()
@@ -161,6 +164,7 @@ def build_scene(
         board_geoms=np.array([model.geom(n).id for some in names for n in some if "/board" in n], np.intp),
         tcp_site=int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "robot/tcp")),
         pedestal=pedestal,
+        said=said,
     )
 
 

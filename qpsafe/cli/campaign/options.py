@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import progress_bar
+from qpsafe.cli.common import console, progress_bar
+from qpsafe.cli.demos.any_robot import READY, any_robot
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
     Raises:
         ConfigurationError: Names the option, or the file with the line.
     """
-    from qpsafe.robot.loader import load_robot
+    from qpsafe.robot.loader import find_robot, load_robot
     from qpsafe.sim.campaign.plan import Plan, load_plan
 
     plan = Plan() if file is None else file if isinstance(file, Plan) else load_plan(file)
@@ -92,6 +93,9 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
         made = replace(plan, **typed)
     except ConfigurationError as wrong:
         raise ConfigurationError("qpsafe campaign", f"--{wrong.key}", wrong.value, wrong.expected) from None
+    if find_robot(made.robot).suffix != ".toml":  # a bare model: a folder is made for it
+        ready = any_robot("qpsafe campaign", made.robot, READY / Path(made.robot).stem, console(True))
+        made = replace(made, robot=str(ready.folder))
     if load_robot(made.robot).spots_path is None:
         expected = "a robot with distance sensors (spots.toml)"
         raise ConfigurationError("qpsafe campaign", "--robot", made.robot, expected)

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, console, make_law, print_json, progress_bar, verdict, write_text
+from qpsafe.cli.common import (
+    LawName,
+    ProjectionName,
+    RobotName,
+    console,
+    make_law,
+    print_json,
+    progress_bar,
+    verdict,
+    write_text,
+)
+from qpsafe.cli.demos.any_robot import any_robot, say
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 
@@ -20,6 +31,7 @@ if TYPE_CHECKING:
 
 
 def fast_person(
+    robot: RobotName = "irb140",
     speed: Annotated[
         list[float] | None, typer.Option(min=0.5, max=2.0, help="Walking speed [m/s]; several are allowed.")
     ] = None,
@@ -42,8 +54,9 @@ def fast_person(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.cli.demos.watching import observed
     from qpsafe.errors import ConfigurationError
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.fast_person import EXPERIMENTS, SPEEDS, fast_figure, runs
+    from qpsafe.sim.experiments.path.for_robot import line_for
+    from qpsafe.sim.experiments.pick_place.for_robot import work_for
     from qpsafe.sim.recording.run_file import StateRecorder, write_run
     from qpsafe.sim.replay.settings import settings_of
 
@@ -51,9 +64,13 @@ def fast_person(
     for name in names:
         if name not in EXPERIMENTS:
             raise ConfigurationError("demo fast-person", "--experiment", name, "one of " + ", ".join(EXPERIMENTS))
-    robot = load_robot("irb140")
+    machine = any_robot("qpsafe demo fast-person", robot, out, screen, 4 if names == ("fixed",) else 6)
+    for name, suits in (("path", line_for), ("pick-and-place", work_for)):
+        if name in names:
+            suits(machine)  # what it cannot do is refused before anything is run
     out.mkdir(parents=True, exist_ok=True)
     found: list[FastRun] = []
+    told: set[str] = set()
     states = StateRecorder()
     with progress_bar(screen) as progress:
 
@@ -61,14 +78,16 @@ def fast_person(
         def watched(name: str, speed: float, built: Any) -> Iterator[Any]:
             nonlocal states
             states, label = StateRecorder(), f"{name}, {speed:g} m/s"
+            say(screen, "added to its model for the simulation:", [x for x in built.scene.said if x not in told])
+            told.update(built.scene.said)
             file = out / f"video-{name}-{speed:g}.mp4"
             with observed(built, file, video, view, screen, progress, label, states) as (observe, _):
                 yield observe
 
-        for run in runs(robot, make_law(law, projection), tuple(speed or SPEEDS), names, lag, watched):
+        for run in runs(machine, make_law(law, projection), tuple(speed or SPEEDS), names, lag, watched):
             found.append(run)
             file = out / f"run-{run.experiment}-{run.speed:g}.npz"
-            write_run(file, run.log, settings_of(run.built), robot, states)
+            write_run(file, run.log, settings_of(run.built), machine, states)
     rows = [run.to_dict() for run in found]
     write_text(out / "table.json", json_text(rows) + "\n")
     fast_figure(found, out / "figure.png")
@@ -83,8 +102,9 @@ def show(found: list[FastRun], screen: Console) -> None:
     """Print the table."""
     from qpsafe.cli.sheet import Sheet
 
-    numbers = ("at [s]", "least gap [mm]", "robot then [m/s]", "closing [m/s]", "moving in contact [s]", "CDF_n")
-    sheet = Sheet("Somebody walks straight at the robot", ("run", "walks [m/s]", "contact", *numbers))
+    speeds = ("robot then [m/s]", "closing [m/s]", "towards [m/s]")
+    headings = ("run", "walks [m/s]", "contact", "at [s]", "least gap [mm]", *speeds, "moving in contact [s]", "CDF_n")
+    sheet = Sheet("Somebody walks straight at the robot", headings)
     for run in found:
         e = run.encounter
         sheet.add_row(
@@ -95,6 +115,7 @@ def show(found: list[FastRun], screen: Console) -> None:
             f"{1e3 * e.distance:.0f}",
             f"{e.robot_speed:.3f}",
             f"{e.closing_speed:.2f}",
+            "-" if e.towards_speed is None else f"{e.towards_speed:.2f}",
             f"{e.moving_contact:.2f}",
             f"{e.danger:.0f}",
         )

@@ -18,6 +18,7 @@ from qpsafe.cli.common import (
     show_checks,
     write_text,
 )
+from qpsafe.cli.demos.any_robot import any_robot, say
 from qpsafe.cli.demos.watching import observed
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 
 def fixed(
     robot: Annotated[
-        str, typer.Option(help="A bundled robot, a robot folder with spots, or 'all': one table over all bundled ones.")
+        str,
+        typer.Option(help="A bundled robot, a robot folder, MJCF or URDF; 'all': a table over all bundled ones."),
     ] = "irb140",
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[
@@ -69,14 +71,17 @@ def fixed(
     if spots is not None and robot == "all":
         raise ConfigurationError("qpsafe demo fixed", "spots", spots, "one robot, not 'all': sensors fit one robot")
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.encounter import encounter
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
     from qpsafe.sim.experiments.fixed.stage import robot_stage
     from qpsafe.sim.stories.file import load_story
 
+    if story is not None:
+        load_story(story)  # a wrong one is refused before anything is written
+
     def make(name: str) -> FixedExperiment:
-        chosen = load_robot(name) if spots is None else load_robot(name).with_spots(spots)
+        chosen = any_robot("qpsafe demo fixed", name, out, screen, joints=4)
+        chosen = chosen if spots is None else chosen.with_spots(spots)
         told = None if story is None else load_story(story, floor=-robot_stage(chosen).pedestal)
         return FixedExperiment(
             chosen,
@@ -99,7 +104,7 @@ def fixed(
     else:
         experiment = make(robot)
         report, log, files = _once(experiment, title, out, video, view, screen)
-        kept, near = report.kept, encounter(log, experiment.robot)
+        kept, near = report.kept, encounter(log, experiment)
         if json:
             print_json(report.to_dict() | {"encounter": near.to_dict()})
         else:
@@ -129,6 +134,7 @@ def _run(experiment: FixedExperiment, out: Path, video: bool, view: bool, screen
     from qpsafe.sim.replay.settings import settings_of
 
     label, states = f"{experiment.robot.name}, {experiment.duration:g} s, 250 Hz", StateRecorder()
+    say(screen, "added to its model for the simulation:", experiment.scene.said)
     with (
         progress_bar(screen) as progress,
         observed(experiment, out / "video.mp4", video, view, screen, progress, label, states) as (observer, filmed),
@@ -143,10 +149,12 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
     from qpsafe.danger.thresholds import robot_activation
     from qpsafe.sim.drawing.plots import distance_figure, figure_11
     from qpsafe.sim.drawing.stories import encounter_figure
+    from qpsafe.sim.experiments.fixed.stage import robot_stage
     from qpsafe.sim.experiments.shared.report import summarise
 
     without = experiment.board_distance_without_controller()
-    report = summarise(log, without, experiment.walk.windows, experiment.robot)
+    tuned = robot_stage(experiment.robot).listed
+    report = summarise(log, without, experiment.walk.windows, experiment.robot, tuned=tuned)
     log.write_csv(out / "signals.csv")
     activation = robot_activation(experiment.robot)
     figure_11(log, out / "figure.png", f"First experiment, {experiment.robot.name}, {title}", activation)

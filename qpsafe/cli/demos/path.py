@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, print_json, progress_bar, show_checks, write_text
+from qpsafe.cli.common import RobotName, console, print_json, progress_bar, show_checks, write_text
+from qpsafe.cli.demos.any_robot import any_robot, say
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 
 def path(
+    robot: RobotName = "irb140",
     seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
@@ -48,13 +50,14 @@ def path(
     from qpsafe.check.check import check_path
     from qpsafe.cli.check import refuse_or_warn
     from qpsafe.cli.demos.watching import observed
+    from qpsafe.danger.thresholds import robot_activation
     from qpsafe.laws.hierarchical import HierarchicalLaw
     from qpsafe.laws.nullspace import NullspaceLaw
     from qpsafe.recovery.recovery import RecoveryRules
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sim.drawing.plots import figure_11
     from qpsafe.sim.experiments.encounter import encounter
-    from qpsafe.sim.experiments.path.experiment import PROGRAM, PathExperiment
+    from qpsafe.sim.experiments.fixed.stage import robot_stage
+    from qpsafe.sim.experiments.path.experiment import ROBOT, PathExperiment
     from qpsafe.sim.experiments.path.plots import side_by_side
     from qpsafe.sim.experiments.path.report import figures, promises, to_dict
     from qpsafe.sim.recording.run_file import StateRecorder, write_run
@@ -62,9 +65,11 @@ def path(
     from qpsafe.sim.stories.file import load_story
     from qpsafe.sim.world.known import known_obstacles
 
-    told = None if story is None else load_story(story)
+    if story is not None:
+        load_story(story)  # a wrong one is refused before anything is written
+    machine, strict = any_robot("qpsafe demo path", robot, out, screen), HierarchicalLaw(solver=solver)
+    told = None if story is None else load_story(story, floor=-robot_stage(machine).pedestal)
     length = duration or (45.0 if told is None else told.duration)
-    robot, strict = load_robot("irb140"), HierarchicalLaw(solver=solver)
     laws: dict[str, Law] = {
         "strict": strict,
         "paper": HierarchicalLaw("paper", solver=solver),
@@ -73,22 +78,23 @@ def path(
     }
     experiments = {
         name: PathExperiment(
-            robot,
+            machine,
             law,
             seed=seed,
             lag=lag,
             duration=length,
             story=told,
             recovery=RecoveryRules(enabled=False) if "no recovery" in name else None,
-            program=PROGRAM if program is None else program,
+            program=program,
         )
         for name, law in laws.items()
     }
     first = experiments["strict"]
     cycle = first.reference.duration  # a wrong program is refused before anything is written or run
-    screen.print(f"{first.program.name}: one cycle takes {cycle:.1f} s", style="dim")
-    check = check_path(robot, first.reference, known=known_obstacles(first.scene))
-    refuse_or_warn("qpsafe demo path", first.program, check, unchecked, screen)
+    say(screen, "added to its model for the simulation:", first.scene.said)
+    screen.print(f"{first.program_name}: one cycle takes {cycle:.1f} s", style="dim")
+    check = check_path(machine, first.reference, known=known_obstacles(first.scene))
+    refuse_or_warn("qpsafe demo path", program, check, unchecked, screen)
     out.mkdir(parents=True, exist_ok=True)
     runs, found, near = {}, {}, {}
     with progress_bar(screen) as progress:
@@ -96,18 +102,20 @@ def path(
             shown, states = (video and name == "strict", view and name == "strict"), StateRecorder()
             with observed(experiment, out / "video.mp4", *shown, screen, progress, name, states) as (observer, _):
                 runs[name] = experiment.run_path(observer)
-            found[name] = figures(runs[name], robot)
-            near[name] = encounter(runs[name].log, robot)
+            found[name] = figures(runs[name], machine)
+            near[name] = encounter(runs[name].log, experiment)
             tag = name.replace(", ", "-").replace(" ", "-")
             runs[name].log.write_csv(out / f"signals-{tag}.csv")
-            write_run(out / f"run-{tag}.npz", runs[name].log, settings_of(experiment), robot, states)
+            write_run(out / f"run-{tag}.npz", runs[name].log, settings_of(experiment), machine, states)
     others = {name: found[name] for name in ("paper", "nullspace")}
-    checks, left_out = promises(found["strict"], found["strict, no recovery"], others)
+    tuned = machine.name == ROBOT
+    checks, left_out = promises(found["strict"], found["strict, no recovery"], others, tuned=tuned)
     if told is not None:  # the other promises are about the bundled people
         checks, left_out = [check for check in checks if "largest step" in check.name], []
     result = to_dict(found, checks, left_out) | {"encounters": {name: item.to_dict() for name, item in near.items()}}
-    figure_11(runs["strict"].log, out / "figure.png", "Second experiment, hierarchical law, strict projection")
-    side_by_side({name: run for name, run in runs.items() if "," not in name}, robot, out / "side-by-side.png")
+    title = f"Second experiment, {machine.name}, hierarchical law, strict projection"
+    figure_11(runs["strict"].log, out / "figure.png", title, robot_activation(machine))
+    side_by_side({name: run for name, run in runs.items() if "," not in name}, machine, out / "side-by-side.png")
     write_text(out / "report.json", json_text(result) + "\n")
     if json:
         print_json(result)

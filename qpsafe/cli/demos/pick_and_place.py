@@ -11,6 +11,7 @@ import typer
 from qpsafe.cli.common import (
     LawName,
     ProjectionName,
+    RobotName,
     SensorName,
     console,
     make_law,
@@ -19,6 +20,7 @@ from qpsafe.cli.common import (
     show_checks,
     write_text,
 )
+from qpsafe.cli.demos.any_robot import any_robot, say
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 from qpsafe.text.words import counted
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
 
 def pick_and_place(
+    robot: RobotName = "irb140",
     seed: Annotated[int, typer.Option(min=0, help="Varies where, when and how fast people go; 0 is nominal.")] = 0,
     seeds: Annotated[int, typer.Option(min=1, help="Run so many seeds, from --seed on, and print the spread.")] = 1,
     cycles: Annotated[int, typer.Option(min=1, max=100, help="Screws to carry in each run.")] = 10,
@@ -69,9 +72,8 @@ def pick_and_place(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.check.check import check_path
     from qpsafe.cli.check import refuse_or_warn
-    from qpsafe.robot.loader import load_robot
-    from qpsafe.sim.experiments.pick_place.cell import PROGRAM
     from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+    from qpsafe.sim.experiments.pick_place.for_robot import ROBOT
     from qpsafe.sim.experiments.pick_place.plots import seeds_figure
     from qpsafe.sim.experiments.pick_place.report import figures, promises, to_dict
     from qpsafe.sim.experiments.pick_place.seeds import run_seeds
@@ -79,21 +81,24 @@ def pick_and_place(
     from qpsafe.sim.world.known import known_obstacles
 
     experiment = PickPlaceExperiment(
-        load_robot("irb140"),
+        any_robot("qpsafe demo pick-and-place", robot, out, screen),
         make_law(law, projection, solver),
         seed=seed,
         cycles=cycles,
         people_file=PEOPLE if people is None else people,
-        program=PROGRAM if program is None else program,
+        program=program,
         lag=lag,
         sensor=sensor.value,
     )
+    if experiment.robot.name != ROBOT:
+        say(screen, "cell chosen for it:", [experiment.work.sentence])
+    say(screen, "added to its model for the simulation:", experiment.scene.said)
     # wrong files are refused before anything is written or run
     length = experiment.reference.duration / len(experiment.cell.holes)
     names = [person.name for person in experiment.people]
     screen.print(f"a cycle takes {length:.1f} s by the program; {' and '.join(names)} come", style="dim")
     check = check_path(experiment.robot, experiment.reference, known=known_obstacles(experiment.scene))
-    refuse_or_warn("qpsafe demo pick-and-place", experiment.program, check, unchecked, screen)
+    refuse_or_warn("qpsafe demo pick-and-place", program, check, unchecked, screen)
     out.mkdir(parents=True, exist_ok=True)
     with progress_bar(screen) as progress:
         run = _first(experiment, out, video, view, screen, progress)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.errors import ConfigurationError
+from qpsafe.extras import require
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
 from qpsafe.sim.campaign.measures import measures
@@ -23,11 +24,9 @@ from qpsafe.sim.campaign.servo import DT, Servo
 from qpsafe.tasks.rotation import log3
 from qpsafe.tick import BAD_INPUT, OK
 
-try:
-    import gymnasium
-    from gymnasium.spaces import Box, Dict
-except ImportError as error:
-    raise MissingExtraError(f"gymnasium is not installed: pip install 'qpsafe[gym]' ({error})") from error
+require("gym", "the environment", "gymnasium")
+import gymnasium  # noqa: E402
+from gymnasium.spaces import Box, Dict  # noqa: E402
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

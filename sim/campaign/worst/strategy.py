@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import MissingExtraError
+from qpsafe.extras import require
 
 
 def strategy(start: NDArray[np.float64], step: float, rng: np.random.Generator, **options: Any) -> Any:
@@ -22,10 +22,8 @@ def strategy(start: NDArray[np.float64], step: float, rng: np.random.Generator, 
     Raises:
         MissingExtraError: cma is not installed.
     """
-    try:
-        import cma
-    except ImportError as error:
-        raise MissingExtraError(f"to search needs cma: pip install 'qpsafe[campaign]' ({error})") from error
+    require("campaign", "a search", "cma")
+    import cma
 
     quiet = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9, "verb_log": 0}
     return cma.CMAEvolutionStrategy(start, step, quiet | options)

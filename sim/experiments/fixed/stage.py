@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.people.person import Person
@@ -32,10 +34,12 @@ class RobotStage(NamedTuple):
     Attributes:
         pedestal: Height of its base above the floor [m].
         choreography: How the person moves.
+        listed: Whether its distances were chosen for this very robot.
     """
 
     pedestal: float
     choreography: Choreography
+    listed: bool
 
 
 def robot_stage(robot: Robot) -> RobotStage:
@@ -47,19 +51,25 @@ def robot_stage(robot: Robot) -> RobotStage:
             [(a["azimuth"], a["start"], a["medium"], a["close"]) for a in table["approaches"]],
         )
     else:
-        pedestal, listed = 0.55, [(azimuth, start, *_pauses(robot, azimuth)) for azimuth, start in DIRECTIONS]
+        pedestal, listed = 0.55, [(azimuth, start, *gaps_beyond(robot, azimuth)) for azimuth, start in DIRECTIONS]
     approaches = tuple(
         Approach(math.radians(azimuth), start=start, medium_distance=medium, close_distance=close, close_pause=PAUSE)
         for azimuth, start, medium, close in listed
     )
     home = max(Choreography.home_radius, max(a.medium_distance for a in approaches) + 0.8)
     person = replace(Person(), floor=-pedestal)
-    return RobotStage(pedestal, Choreography(approaches, person=person, home_radius=home))
+    return RobotStage(pedestal, Choreography(approaches, person=person, home_radius=home), table is not None)
 
 
-def _pauses(robot: Robot, azimuth: float) -> tuple[float, float]:
-    """Distances of the board at both pauses, by the rule [m]."""
+def gaps_beyond(robot: Robot, azimuth: float, tips: Sequence[NDArray[np.float64]] = ()) -> tuple[float, float]:
+    """Distances of the board at both pauses, by the rule [m].
+
+    Args:
+        robot: The robot.
+        azimuth: Direction in which people come [deg].
+        tips: Where else its tool goes, (3,) each [m].
+    """
     wire = robot.wire(robot.home, np.zeros(robot.nq))
     towards = np.array([math.cos(math.radians(azimuth)), math.sin(math.radians(azimuth)), 0.0])
-    reach = max(float((np.vstack([wire.starts, wire.ends]) @ towards).max()), 0.15)
+    reach = max(float((np.vstack([wire.starts, wire.ends, *tips]) @ towards).max()), 0.15)
     return reach + MEDIUM_GAP, reach + CLOSE_GAP

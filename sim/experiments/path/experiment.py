@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, Observer
+from qpsafe.sim.experiments.path.for_robot import line_for, walk_for
 from qpsafe.sim.experiments.shared.programmed import Programmed
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.recording.log import RunLog
@@ -20,6 +21,7 @@ from qpsafe.tick import Tick
 #: The bundled path.
 PROGRAM = Path(__file__).with_name("path.toml")
 
+ROBOT = "irb140"  # whose line, and whose people, are the bundled ones
 #: Quiet for two passes of the line; then from the front, then from the left.
 SECOND_EXPERIMENT: tuple[Approach, ...] = (
     Approach(math.radians(0.0), start=9.0, medium_distance=1.02, close_distance=0.78, close_pause=2.0),
@@ -49,12 +51,21 @@ class PathExperiment(Programmed, FixedExperiment):
     """One run of the second experiment; settings as for the first.
 
     Attributes:
-        program: TOML file of what the tool follows.
+        program: TOML file of what the tool follows; by default the IRB 140's line, or one that suits the robot.
     """
 
-    choreography: Choreography = field(default_factory=lambda: Choreography(SECOND_EXPERIMENT))
     duration: float = 45.0
-    program: Path = PROGRAM
+    program: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.choreography is None:
+            own = self.robot.name == ROBOT
+            self.choreography = Choreography(SECOND_EXPERIMENT) if own else walk_for(self.robot, self.reference)
+        super().__post_init__()
+
+    def own_program(self) -> str:
+        """The bundled line, or another robot's own."""
+        return PROGRAM.read_text(encoding="utf-8") if self.robot.name == ROBOT else line_for(self.robot)
 
     def run_path(self, observer: Observer | None = None) -> PathRun:
         """Run it; see `FixedExperiment.run`."""

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from qpsafe.danger.activation import Activation
-from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, save, shade
+from qpsafe.danger.thresholds import robot_activation
+from qpsafe.sim.drawing.plots import HIGH, MEDIUM, STYLE, shade
 from qpsafe.sim.experiments.path.experiment import PathRun
+from qpsafe.text.figure_file import save
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -30,7 +31,7 @@ def side_by_side(runs: Mapping[str, PathRun], robot: Robot, path: Path) -> None:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.4 * len(runs), 9.6), layout="constrained")
         axes = figure.subplots(5, len(runs), sharex=True, sharey="row", squeeze=False)
-        high, low = Activation().thresholds
+        high, low = robot_activation(robot).thresholds
         for column, (name, run) in zip(axes.T, runs.items(), strict=True):
             log = run.log
             position, orientation = (np.linalg.norm(e, axis=1) for e in (log.position_error, log.orientation_error))
@@ -43,7 +44,7 @@ def side_by_side(runs: Mapping[str, PathRun], robot: Robot, path: Path) -> None:
             column[1].semilogy(log.time, np.maximum(orientation, 1e-9), color="#0b5fa5")
             column[2].semilogy(log.time, np.maximum(1e3 * position, 1e-6), color="#0b5fa5")
             column[3].plot(log.time, 1e3 * run.origin[:, 1], color="#555555", linestyle="--", label="path")
-            tool = run.origin - log.position_error
+            tool = run.origin - log.position_error[:, :3]  # of the tool that follows the line
             column[3].plot(log.time, 1e3 * tool[:, 1], color="#0b5fa5", label="tool")
             column[4].plot(log.time, (np.abs(log.qd_ref) / robot.max_velocity).max(axis=1), color="#0b5fa5")
             column[4].set_xlabel("time [s]")

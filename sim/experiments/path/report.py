@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from qpsafe.recovery.recovery import FOLLOWING
 from qpsafe.sim.experiments.path.experiment import PathRun
-from qpsafe.sim.experiments.shared.report import Check, split
+from qpsafe.sim.experiments.shared.report import Check, all_kept, split
 from qpsafe.text.json_text import plain
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def returning(run: PathRun) -> Flags:
 
 
 def promises(
-    strict: PathFigures, without: PathFigures | None, others: Mapping[str, PathFigures]
+    strict: PathFigures, without: PathFigures | None, others: Mapping[str, PathFigures], *, tuned: bool = True
 ) -> tuple[list[Check], list[str]]:
     """What the second experiment is to show.
 
@@ -112,6 +112,8 @@ def promises(
         strict: The hierarchical law with the strict projection.
         without: The same run without suspension and recovery.
         others: The other laws by name; the null-space law as ``nullspace``.
+        tuned: Whether line and people were chosen for this robot; if not, what the paper reports of another one is
+            shown and does not count.
 
     Returns:
         The promises, and the names of those that the runs can neither keep nor break, for want of such moments.
@@ -124,7 +126,8 @@ def promises(
     if "nullspace" in others:
         error, name = others["nullspace"].line_orientation, "null-space law: the same orientation error"
         promised = "> 1e-3 rad, as the paper reports"
-        found.insert(1, name if error is None else Check(name, f"{error:.3g} rad", promised, bool(error > 1e-3)))
+        name = name if tuned else f"{name} (no promise)"
+        found.insert(1, name if error is None else Check(name, f"{error:.3g} rad", promised, bool(error > 1e-3), tuned))
     for name, run in {"strict": strict, **others}.items():
         found.append(_bound(f"{name}: largest step of q̇ beyond a_max dt", run.step - 1.0, 1e-9, "a_max dt"))
     if without is not None:
@@ -138,8 +141,9 @@ def promises(
             if with_it is None or without_it is None:
                 found.append(name)
                 continue
-            kept = bool(with_it < without_it and with_it <= 1.0 + 1e-9)
-            promised = f"< {without_it:.3f} without recovery, and <= 1"
+            # how far high danger drives the robot off depends on how near people come
+            kept = bool((with_it < without_it or not tuned) and with_it <= 1.0 + 1e-9)
+            promised = f"< {without_it:.3f} without recovery, and <= 1" if tuned else f"<= 1 ({without_it:.3f} without)"
             found.append(Check(name, f"{with_it:.3f} of the limit", promised, kept))
     return split(found)
 
@@ -156,7 +160,7 @@ def to_dict(found: Mapping[str, PathFigures], checks: list[Check], left_out: Seq
         "laws": {name: plain(asdict(item)) for name, item in found.items()},
         "checks": [check._asdict() for check in checks],
         "left_out": list(left_out),
-        "kept": all(check.kept for check in checks),
+        "kept": all_kept(checks),
     }
 
 

@@ -90,6 +90,7 @@ class Cell:
         support, box, tables: What stands where.
         full: How many holes have a screw at the beginning.
         carried: How many screws people bring along.
+        top: Height of the tables above the robot's base [m].
     """
 
     support: Support = field(default_factory=Support)
@@ -97,13 +98,14 @@ class Cell:
     tables: tuple[Table, ...] = (Table("left table", (0.49, 0.43)), Table("right table", (0.49, -0.43)))
     full: int = 10
     carried: int = 0
+    top: float = TABLE_TOP
 
     @property
     def holes(self) -> Array:
         """Where the head of a screw in each hole has its top, (holes, 3) [m], row by row."""
         s = self.support
         x, y = (s.pitch * (np.arange(count) - 0.5 * (count - 1)) for count in (s.columns, s.rows))
-        z = TABLE_TOP + s.thickness + Screw.HEAD
+        z = self.top + s.thickness + Screw.HEAD
         return np.array([(s.centre[0] + dx, s.centre[1] + dy, z) for dy, dx in product(y, x)])
 
     @property
@@ -115,7 +117,7 @@ class Cell:
         """Which of some points (k, 3) lie in the box, (k,)."""
         b = self.box
         inside = np.abs(points[:, :2] - b.centre) <= (0.5 * b.length, 0.5 * b.width)
-        height = points[:, 2] - TABLE_TOP
+        height = points[:, 2] - self.top
         return inside.all(axis=1) & (height > 0.0) & (height < b.height + Screw.HEAD)
 
     def furnish(self, spec: Any) -> None:
@@ -128,9 +130,9 @@ class Cell:
                 geom.contype = geom.conaffinity = 0
         add_camera(spec.worldbody, CAMERA, [3.3, -0.75, 1.75], [0.30, 0.0, 0.26], 34.0)
         for table in self.tables:
-            _add_table(spec.worldbody, table, self._floor(spec))
+            _add_table(spec.worldbody, table, self.top, self._floor(spec))
         _add_support(spec.worldbody, self)
-        _add_box(spec.worldbody, self.box)
+        _add_box(spec.worldbody, self.box, self.top)
         for k in range(self.screws):
             place = self.holes[k] if k < self.full else (-3.0 - 0.1 * k, 0.0, self._floor(spec) + 0.05)
             _add_screw(spec, k, place)
@@ -219,10 +221,10 @@ def _add_block(world: Any, name: str, low: Any, high: Any, colour: tuple[float, 
     )
 
 
-def _add_table(world: Any, table: Table, floor: float) -> None:
+def _add_table(world: Any, table: Table, top: float, floor: float) -> None:
     x, y, half, side = *table.centre, 0.5 * table.length, 0.5 * table.width
-    under = TABLE_TOP - table.thickness
-    _add_block(world, table.name, (x - half, y - side, under), (x + half, y + side, TABLE_TOP), WOOD)
+    under = top - table.thickness
+    _add_block(world, table.name, (x - half, y - side, under), (x + half, y + side, top), WOOD)
     for name, at in (("near", x - half + 0.02), ("far", x + half - 0.06)):
         low, high = (at, y - side + 0.03, floor), (at + 0.04, y + side - 0.03, under)
         _add_block(world, f"{table.name} {name} panel", low, high, ALUMINIUM)
@@ -231,7 +233,7 @@ def _add_table(world: Any, table: Table, floor: float) -> None:
 def _add_support(world: Any, cell: Cell) -> None:
     """A plate of strips that leave the holes free: long ones between the rows, short ones between the holes."""
     s = cell.support
-    body = world.add_body(name="support", pos=[*s.centre, TABLE_TOP])
+    body = world.add_body(name="support", pos=[*s.centre, cell.top])
     x, y = (s.pitch * (np.arange(count) - 0.5 * (count - 1)) for count in (s.columns, s.rows))
     edge_x, edge_y = np.abs(x).max() + s.margin, np.abs(y).max() + s.margin
     gaps_x, gaps_y = (_gaps(centres, s.hole, edge) for centres, edge in ((x, edge_x), (y, edge_y)))
@@ -249,9 +251,9 @@ def _gaps(centres: NDArray, width: float, edge: float) -> list[tuple[float, floa
     return [(float(a), float(b)) for a, b in list(pairwise(ends))[::2]]
 
 
-def _add_box(world: Any, box: Box) -> None:
+def _add_box(world: Any, box: Box, table: float) -> None:
     x, y, a, b, wall = *box.centre, 0.5 * box.length, 0.5 * box.width, box.wall
-    z, top = TABLE_TOP, TABLE_TOP + box.height
+    z, top = table, table + box.height
     sides = {
         "floor": ((x - a, y - b, z), (x + a, y + b, z + wall)),
         "near": ((x - a - wall, y - b - wall, z), (x - a, y + b + wall, top)),

@@ -69,7 +69,7 @@ class PickPlaceExperiment(PickPlaceSettings):
             SimulationFailedError: MuJoCo reported bad values.
         """
         loop = PickLoop(self)
-        controller, plant, scene, robot = loop.controller, loop.plant, loop.scene, self.robot
+        controller, plant, scene, robot, frame = loop.controller, loop.plant, loop.scene, self.robot, loop.frame
         assert controller.spots is not None
         recorder = Recorder(controller.dt, controller.spots.names)
         furniture, gaps = Furniture(scene), TrueDistances(scene)
@@ -80,7 +80,7 @@ class PickPlaceExperiment(PickPlaceSettings):
             tick, q, qd, distances, state = loop.step()
             done += tick.events.count(RELEASE)
             left, after = left - 1, after - (done >= self.cycles)
-            pose, goal = state.pose("tcp"), self.reference.sample(tick.path_time).pose
+            pose, goal = state.pose(frame), self.reference.sample(tick.path_time).pose
             commanded = robot.at(tick.reference.q)
             gap = gaps.person(plant.data).distance if self.people else np.inf
             recorder.add(
@@ -89,9 +89,9 @@ class PickPlaceExperiment(PickPlaceSettings):
                 qd,
                 distances,
                 pose_error(pose, goal),
-                euler_error(commanded.pose("tcp"), goal),
+                euler_error(commanded.pose(frame), goal),
                 (np.inf, gap),
-                errors=own_errors(self, commanded, {"tcp": goal}),
+                errors=own_errors(self, commanded, {frame: goal}),
                 metrics=self.measured(tick, scene, plant),
             )
             path_time.append(tick.path_time)

@@ -18,17 +18,22 @@ from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
+from qpsafe.sim.world.tool_axis import tool_axis, turned_to
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 
-#: A screw in the gripper: its head's top at the tip, its shank ahead.
-SCREW = Obstacle.box(
-    "screw",
-    (2.0 * Screw.HEAD_RADIUS, 2.0 * Screw.HEAD_RADIUS, Screw.HEAD + Screw.SHANK),
-    (0.0, 0.0, 0.5 * (Screw.HEAD + Screw.SHANK)),
-)
 GRIP, RELEASE = "grip", "release"  # events of the program
 SETTLED = 0.02  # a screw slower than this rests [m/s]
+
+
+Array = NDArray[np.float64]
+
+
+def screw_along(axis: Array) -> Obstacle:
+    """A screw in the gripper: its head's top at the tip, its shank ahead along the tool's axis (3,)."""
+    width, length = 2.0 * Screw.HEAD_RADIUS, Screw.HEAD + Screw.SHANK
+    straight = Obstacle.box("screw", (width, width, length), (0.0, 0.0, 0.5 * length))
+    return Obstacle("screw", straight.vertices @ turned_to(np.array([0.0, 0.0, 1.0]), axis).T)
 
 
 class PickEvent(NamedTuple):
@@ -60,16 +65,17 @@ class PickLoop:
         self.scene, self.cell, self.people = scene, cell, experiment.people
         self.plant = Plant(scene, lag=experiment.lag, q=experiment.start)
         self.program = experiment.reference
+        self.frame = self.program.frame
         tasks = experiment.tasks
         if tasks is None:
-            tasks = [PositionTask("tcp", self.program), OrientationTask("tcp", self.program)]
+            tasks = [PositionTask(self.frame, self.program), OrientationTask(self.frame, self.program)]
         self.controller = SafetyController(
             robot,
             tasks,
             experiment.law,
             sensing=experiment.rules,
             known=known_obstacles(scene),
-            carried={"tcp": [SCREW]},  # the gripper may hold one
+            carried={self.frame: [screw_along(tool_axis(robot, self.frame))]},  # the gripper may hold one
             recovery=experiment.recovery,
             **experiment.parts(),
         )

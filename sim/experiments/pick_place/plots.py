@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from qpsafe.danger.activation import Activation
-from qpsafe.sim.drawing.plots import STYLE, plain, save, shade
+from qpsafe.sim.drawing.plots import STYLE, plain, shade
 from qpsafe.sim.experiments.pick_place.experiment import PickRun
 from qpsafe.sim.experiments.pick_place.report import PickFigures, cost
+from qpsafe.text.figure_file import save
 from qpsafe.text.words import counted
 
 BLUE, RED, GREEN, GREY, OCHRE = "#0b5fa5", "#c0392b", "#2a8c3c", "#555555", "#b07a00"

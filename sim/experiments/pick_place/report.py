@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.experiments.pick_place.experiment import PickRun
-from qpsafe.sim.experiments.shared.report import Check
+from qpsafe.sim.experiments.shared.report import Check, all_kept
 from qpsafe.text.json_text import plain
 from qpsafe.text.words import counted
 
@@ -149,5 +149,5 @@ def to_dict(runs: Sequence[PickFigures], alone: PickFigures, checks: Sequence[Ch
         "cost_per_cycle": spread(costs),
         "duration": spread([item.duration for item in runs]),
         "checks": [check._asdict() for check in checks],
-        "kept": all(check.kept for check in checks),
+        "kept": all_kept(checks),
     }

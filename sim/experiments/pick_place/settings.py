@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qpsafe.laws.problem import Law
-from qpsafe.sim.experiments.pick_place.cell import PROGRAM, Cell
+from qpsafe.sim.experiments.pick_place.cell import Cell
+from qpsafe.sim.experiments.pick_place.for_robot import Work, work_for
 from qpsafe.sim.experiments.pick_place.people import load_people
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.experiments.shared.programmed import Programmed
@@ -43,7 +44,8 @@ class PickPlaceSettings(Programmed, Control):
         sensor: ``ideal`` distances, or those of ``sharp`` sensors.
         rules: What counts as danger; None for the controller's default.
         recovery: How the robot returns to its path; None for the controller's default.
-        program: TOML file of what the tool does, with the events ``grip`` and ``release``.
+        program: TOML file of what the tool does, with the events ``grip`` and ``release``; by default the IRB 140's, or
+            one that suits the robot.
     """
 
     robot: Robot
@@ -57,7 +59,7 @@ class PickPlaceSettings(Programmed, Control):
     sensor: str = "ideal"
     rules: SensingRules | None = None
     recovery: RecoveryRules | None = None
-    program: Path = PROGRAM
+    program: Path | None = None
 
     @property
     def duration(self) -> float:
@@ -68,7 +70,10 @@ class PickPlaceSettings(Programmed, Control):
     @cached_property
     def story(self) -> Story | None:
         """The people's story as this seed varies it."""
-        return None if self.people_file is None else load_people(self.people_file, self.seed)
+        if self.people_file is None:
+            return None
+        cell = self.work.cell if self.people_file == PEOPLE else None  # the bundled people go where the cell is
+        return load_people(self.people_file, self.seed, -self.work.pedestal, cell)
 
     @property
     def people(self) -> tuple[Actor, ...]:
@@ -83,10 +88,19 @@ class PickPlaceSettings(Programmed, Control):
     @cached_property
     def cell(self) -> Cell:
         """The cell, with as many screws as there are."""
-        return Cell(carried=sum(self.carried))
+        return replace(self.work.cell, carried=sum(self.carried))
+
+    @property
+    def work(self) -> Work:
+        """Where things stand for this robot, and what it does there."""
+        return work_for(self.robot)
+
+    def own_program(self) -> str:
+        """The bundled work, or another robot's own."""
+        return self.work.program
 
     @cached_property
     def scene(self) -> Scene:
         """The world, built on first use."""
         people = () if self.story is None else self.story.persons
-        return build_scene(self.robot, people=people, furnish=self.cell.furnish)
+        return build_scene(self.robot, pedestal=self.work.pedestal, people=people, furnish=self.cell.furnish)

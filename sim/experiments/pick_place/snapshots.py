@@ -103,9 +103,10 @@ def draw(experiment: PickPlaceExperiment, run: PickRun, path: Path) -> list[Mome
     """
     import matplotlib
 
-    from qpsafe.sim.drawing.plots import STYLE, save
+    from qpsafe.sim.drawing.plots import STYLE
     from qpsafe.sim.drawing.render import Camera
     from qpsafe.sim.experiments.pick_place.cell import CAMERA
+    from qpsafe.text.figure_file import save
 
     found = moments(run)
     if not found:

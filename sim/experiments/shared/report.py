@@ -43,12 +43,26 @@ class ApproachRow(NamedTuple):
 
 
 class Check(NamedTuple):
-    """One promise: what was measured, what was promised, whether it was kept."""
+    """One promise.
+
+    Attributes:
+        name: What it is about.
+        measured: In words.
+        promised: In words.
+        kept: Whether it was kept.
+        counts: Whether the run is to keep it. What only figures of another robot justify is shown, and does not count.
+    """
 
     name: str
     measured: str
     promised: str
     kept: bool
+    counts: bool = True
+
+
+def all_kept(checks: Sequence[Check]) -> bool:
+    """Whether every promise that counts was kept."""
+    return all(check.kept or not check.counts for check in checks)
 
 
 def split(found: Sequence[Check | str]) -> tuple[list[Check], list[str]]:
@@ -79,7 +93,7 @@ class Report:
     @property
     def kept(self) -> bool:
         """Whether every promise was kept."""
-        return all(check.kept for check in self.checks)
+        return all_kept(self.checks)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -89,7 +103,9 @@ class Report:
         return result | {"kept": self.kept}
 
 
-def summarise(log: RunLog, without: NDArray[np.float64], windows: tuple[Window, ...], robot: Robot) -> Report:
+def summarise(
+    log: RunLog, without: NDArray[np.float64], windows: tuple[Window, ...], robot: Robot, *, tuned: bool = True
+) -> Report:
     """Make the report of a run.
 
     Args:
@@ -97,14 +113,24 @@ def summarise(log: RunLog, without: NDArray[np.float64], windows: tuple[Window, 
         without: Distance robot-board at every tick if the robot keeps its pose (N,) [m].
         windows: Start and end of each approach; what is about one that the run does not complete is left out [s].
         robot: For its limits.
+        tuned: Whether people's pauses were chosen for this robot, so that every approach shows all of Table I. If not,
+            what depends on them is shown and does not count.
     """
-    found: list[Check | str] = [*_order(log, windows), *_errors(log, windows), *_limits(log, robot)]
+    shown: list[Check | str] = [*_order(log, windows), *_released(log, windows)]
+    if not tuned:
+        shown = [c if isinstance(c, str) else c._replace(counts=False, name=f"{c.name} (no promise)") for c in shown]
+    found = [*shown, *_errors(log, windows), *_limits(log, robot)]
     approaches = []
     for start, end in windows:
         if not _complete(log, end):
             found.append(f"distance to the board, approach at {start:.1f} s")
             continue
         inside = _between(log, start, end)
+        if (
+            not tuned and not (log.regime[inside] == "high").any()
+        ):  # nobody came near enough for sensors at a rule's places
+            found.append(f"distance to the board, approach at {start:.1f} s")
+            continue
         approaches.append(
             ApproachRow(start, end, float(log.board_distance[inside].min()), float(without[inside].min()))
         )
@@ -174,20 +200,37 @@ def _errors(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
     quiet = slice(0, seen[0] if len(seen) else len(log.time))
     checks = _pair("before anything is detected", position[quiet], orientation[quiet], (0.1, 0.001))
     for start, end in windows:
-        inside = np.flatnonzero(_between(log, start, end))
-        high = inside[log.regime[inside] == "high"]
-        medium = inside[(log.regime[inside] == "medium") & (inside < (high[0] if len(high) else len(log.time)))]
-        name = f"in medium before high, approach at {start:.1f} s"
-        if not (len(medium) and _complete(log, end)):
-            checks += ["position error " + name, "orientation error " + name]
-            continue
-        checks.append(_bound("position error " + name, 1e3 * position[medium].max(), 2.0, "mm"))
-        peak = orientation[medium].max()
-        checks.append(Check("orientation error " + name, f"{peak:.3f} rad", "> 0.05 rad", bool(peak > 0.05)))
+        medium = _before_high(log, start, end)
+        name = f"position error in medium before high, approach at {start:.1f} s"
+        whole = len(medium) and _complete(log, end)
+        checks.append(_bound(name, 1e3 * position[medium].max(), 2.0, "mm") if whole else name)
     if windows:
         k = int(np.searchsorted(log.time, windows[-1][1] + 10.0))
         checks += _pair("10 s after the last withdrawal", position[k:], orientation[k:], (1.0, 0.01))
     return checks
+
+
+def _released(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
+    """In medium danger the tool turns: how far depends on how near people pause."""
+    orientation, checks = _norm(log.orientation_error), list[Check | str]()
+    for start, end in windows:
+        medium, name = (
+            _before_high(log, start, end),
+            f"orientation error in medium before high, approach at {start:.1f} s",
+        )
+        if not (len(medium) and _complete(log, end)):
+            checks.append(name)
+            continue
+        peak = orientation[medium].max()
+        checks.append(Check(name, f"{peak:.3f} rad", "> 0.05 rad", bool(peak > 0.05)))
+    return checks
+
+
+def _before_high(log: RunLog, start: float, end: float) -> NDArray[np.intp]:
+    """Ticks of an approach in medium danger, before any in high."""
+    inside = np.flatnonzero(_between(log, start, end))
+    high = inside[log.regime[inside] == "high"]
+    return inside[(log.regime[inside] == "medium") & (inside < (high[0] if len(high) else len(log.time)))]
 
 
 def _pair(when: str, position: Array, orientation: Array, bounds: tuple[float, float]) -> list[Check | str]:

@@ -80,6 +80,7 @@ def test_somebody_fast_is_reported_whatever_happens(tmp_path: Path) -> None:
     assert (row["experiment"], row["speed"]) == ("fixed", 2.0)
     assert (row["contact"] is None) == (row["distance"] > 0.0)
     assert row["danger"] > 11.5
+    assert (row["towards_speed"] is None) == (row["contact"] is None)
     assert json.loads((tmp_path / "table.json").read_text()) == [row]
     assert run("replay", str(tmp_path / "run-fixed-2.npz"))[0] == 0
 

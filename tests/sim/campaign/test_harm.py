@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.sim.campaign.contact import classified, point_jacobian
+from qpsafe.sim.campaign.contact import classified
 from qpsafe.sim.campaign.harm import REGIONS, blow, effective_mass
 from qpsafe.sim.people.anatomy import SEGMENTS
+from qpsafe.sim.world.contact_point import point_jacobian
 
 regions = st.sampled_from(sorted(REGIONS))
 

@@ -36,6 +36,7 @@ from qpsafe.sim.replay.replay import replay
 from qpsafe.sim.replay.settings import experiment_of, settings_of
 from qpsafe.sim.replay.stage import Stage
 from qpsafe.sim.stories.file import parse_story
+from qpsafe.sim.world.distance import TrueDistances
 
 ROBOT = qpsafe.load_robot("irb140")
 NEAR = """
@@ -273,18 +274,37 @@ def test_a_law_of_ones_own_cannot_be_recorded() -> None:
 
 def test_encounter_says_what_the_log_shows(recorded) -> None:
     """Somebody at 2 m/s touches the robot while it retreats."""
-    _, _, log = recorded
-    near = encounter(log, ROBOT)
+    _, experiment, log = recorded
+    near = encounter(log, experiment)
     gap = np.minimum(log.person_distance, log.board_distance)
     assert near.distance == gap.min()
     assert (near.contact is None) == bool(gap.min() > 0.0)
     away = replace(log, person_distance=log.person_distance + 1.0)
-    assert encounter(away, ROBOT).contact is None
-    assert "no contact" in encounter(away, ROBOT).sentence()
+    assert encounter(away, experiment).contact is None
+    assert "no contact" in encounter(away, experiment).sentence()
     touching = replace(log, person_distance=log.person_distance - 5.0)
-    assert encounter(touching, ROBOT).contact == 0.0
-    assert encounter(touching, ROBOT).moving_contact <= 1.5
-    assert "CONTACT at 0.00 s" in encounter(touching, ROBOT).sentence()
+    assert encounter(touching, experiment).contact == 0.0
+    assert encounter(touching, experiment).moving_contact <= 1.5
+    assert "CONTACT at 0.00 s" in encounter(touching, experiment).sentence()
+
+
+def test_the_speed_towards_somebody_is_that_of_the_gap_if_they_stood_still(recorded) -> None:
+    """One tick before contact; positive where the robot comes nearer, whatever the person does."""
+    _, experiment, log = recorded
+    scene, gaps = experiment.scene, TrueDistances(experiment.scene)
+    fastest = np.linalg.norm(log.qd, axis=1).argsort()[-400::80]
+    found = []
+    for k in map(int, fastest):
+        gap = np.where(np.arange(len(log.time)) > k, -1.0, 1.0)  # contact at the tick after k
+        found.append(encounter(replace(log, person_distance=gap), experiment).towards_speed)
+        measured = []
+        for sign in (1.0, -1.0):
+            data = scene.make_data(log.q[k] + sign * 1e-5 * log.qd[k])
+            scene.place_people(data, [person.pose(k * log.dt) for person in experiment.walk.people])
+            measured.append(min(near.distance for near in gaps.measure(data)))
+        assert found[-1] == pytest.approx((measured[1] - measured[0]) / 2e-5, abs=1e-3)
+    assert max(map(abs, found)) > 0.01
+    assert encounter(log, experiment).contact is not None or encounter(log, experiment).towards_speed is None
 
 
 def test_the_command_says_same_or_what_differs(recorded, tmp_path: Path) -> None:

@@ -1,0 +1,48 @@
+"""`--robot` of the demos: any robot, made ready, with what was chosen for it said in one short list."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from qpsafe.robot.robot import Robot
+
+READY = Path("out/robots")  # where folders are made for robots that a command writes nothing else for
+
+
+def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6) -> Robot:
+    """The robot that is meant, with a home posture and sensors.
+
+    Args:
+        where: The command, for errors.
+        name: What was typed.
+        out: Folder of the results; what is chosen for a robot is written there.
+        screen: Where it is said.
+        joints: How many must carry the tool, at least.
+
+    Raises:
+        ConfigurationError: The robot cannot do what the command shows.
+    """
+    from qpsafe.sim.experiments.shared.ready import made_ready
+
+    ready = made_ready(where, name, out, joints)
+    say(screen, f"{ready.robot.name}:", ready.said)
+    return ready.robot
+
+
+def say(screen: Console, heading: str, said: Sequence[str]) -> None:
+    """A short list; nothing where there is nothing to say.
+
+    Args:
+        screen: Where to.
+        heading: Above it.
+        said: What was chosen or added, in words.
+    """
+    if said:
+        screen.print(heading, style="yellow")
+        for line in said:
+            screen.print(f"  {line}", style="yellow")

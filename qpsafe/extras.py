@@ -1,0 +1,33 @@
+"""What only some uses need, and the named error where it is not installed. A robot's computer needs none of it."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+
+from qpsafe.errors import MissingExtraError
+
+
+def require(extra: str, what: str, *modules: str) -> None:
+    """Say at once, and by its extra, what is not installed; nothing is imported.
+
+    Args:
+        extra: Of qpsafe, as in ``pip install 'qpsafe[extra]'``.
+        what: Needs it, to begin the message with.
+        modules: All of these.
+
+    Raises:
+        MissingExtraError: Names the first that is missing, and the extra.
+    """
+    for module in modules:
+        if not _is_there(module):
+            raise MissingExtraError(f"{what} needs {module}: pip install 'qpsafe[{extra}]'")
+
+
+def _is_there(module: str) -> bool:
+    if module in sys.modules:
+        return sys.modules[module] is not None
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):  # its package is missing, or somebody forbids it
+        return False

@@ -1,0 +1,127 @@
+"""Any robot made ready for an experiment: a home posture and distance sensors where its files have none.
+
+What is chosen is written as a robot folder, `robot.toml` and `spots.toml`, so that it can be read, corrected, replayed
+and used for the next run: the experiment runs on that folder, as it would on one written by hand.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.robot.defaults import HOMELESS
+from qpsafe.robot.loader import bundled_robots, find_robot, load_robot
+from qpsafe.robot.starting_file import starting_robot_toml
+from qpsafe.sim.experiments.shared.home import Arm, chosen_home
+from qpsafe.sim.experiments.shared.skin import skin_toml
+from qpsafe.sim.world.robot_spec import UNSTATED, torques
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+STRONG = 0.9  # share of a motor's torque that motion may take
+MOST = 3.0  # longest arm that the experiments' people can walk around [m]
+
+
+class Ready(NamedTuple):
+    """A robot that an experiment can run on.
+
+    Attributes:
+        robot: The robot.
+        said: What was chosen for it, in words; nothing for one that has all it needs.
+    """
+
+    robot: Robot
+    said: tuple[str, ...] = ()
+
+
+def made_ready(where: str, name: str, out: Path, joints: int = 4) -> Ready:
+    """Load a robot and give it what it lacks; nothing is written for one that lacks nothing.
+
+    Args:
+        where: The command, for errors.
+        name: A bundled name, a robot folder, an MJCF or URDF file, or a model of another package.
+        out: Where a folder `robot` is made, if need be.
+        joints: How many must carry the tool, at least.
+
+    Raises:
+        ConfigurationError: The robot cannot do what the command shows; says why, before anything is written.
+        RobotFileError: The robot's files are wrong.
+    """
+    robot, folder = _quietly(name), out / "robot"
+    check_arm(where, robot, joints)
+    if name in bundled_robots():
+        return Ready(robot)
+    said, bare = list(robot.notes), find_robot(name).suffix != ".toml"
+    if bare:
+        home, stated = robot.home, not any(note.startswith(HOMELESS) for note in said)  # an MJCF may have a keyframe
+        if not stated:
+            home = chosen_home(robot)
+            said = [note for note in said if not note.startswith(HOMELESS)]
+            said.append(f"home posture chosen: {', '.join(f'{q:.2f}' for q in home)} rad")
+        share, words = bearable(robot)
+        said += words
+        folder.mkdir(parents=True, exist_ok=True)
+        gentle = share * robot.max_acceleration
+        text = starting_robot_toml(robot, folder, home=home, max_acceleration=gentle, spots="spots.toml")
+        (folder / "robot.toml").write_text(text, encoding="utf-8")
+        robot = _quietly(folder)
+    if bare or robot.spots_path is None:
+        text, count = skin_toml(robot)
+        if not count:
+            raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "spots.toml").write_text(text, encoding="utf-8")
+        robot = _quietly(folder) if bare else robot.with_spots((folder / "spots.toml").resolve())
+        said += [
+            f"{count} distance sensors put on its links",
+            f"written to {folder}: correct it, and give it as --robot",
+        ]
+    return Ready(robot, tuple(said))
+
+
+def bearable(robot: Robot) -> tuple[float, list[str]]:
+    """How much of assumed accelerations the stated torques can bear, and what is to be said of it."""
+    stated = np.ravel(robot.model.effortLimit)
+    known = (stated > 0.0) & (stated < UNSTATED)
+    if not known.any():
+        return 1.0, []
+    moving, holding = torques(robot)
+    room = (STRONG * stated - holding)[:, known] / np.maximum(moving[:, known], 1e-9)
+    share = float(np.clip(room.min(), 0.1, 1.0))
+    if share == 1.0:
+        return 1.0, []
+    return share, [f"accelerations reduced to {100 * share:.0f} %: more the stated torques cannot bear everywhere"]
+
+
+def _quietly(name: str | Path) -> Robot:
+    """A robot whose notes are said by who asks for it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return load_robot(name)
+
+
+def check_arm(where: str, robot: Robot, joints: int) -> None:
+    """Whether the robot's (first) tool is carried by joints enough, and is of a size that people can stand around.
+
+    Args:
+        where: The command, for errors.
+        robot: The robot.
+        joints: How many, at least.
+
+    Raises:
+        ConfigurationError: It is not; names what is wanted.
+    """
+    arm = Arm.of(robot)
+    if len(arm.joints) < joints:
+        found = f"{robot.name}, {arm.tool} on {len(arm.joints)} joints"
+        raise ConfigurationError(where, "--robot", found, f"an arm with {joints} joints or more between base and tool")
+    if not (np.isfinite(arm.length) and 0.15 < arm.length <= MOST):
+        found = f"{robot.name}, an arm of {arm.length:.2f} m"
+        raise ConfigurationError(
+            where, "--robot", found, f"an arm of 0.15 to {MOST:g} m from its second joint to its tool"
+        )
