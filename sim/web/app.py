@@ -95,7 +95,7 @@ class App:
             self._setup = setup
         self.controls.follow(frame)
         if self._page.watched:
-            self.view.show(frame)
+            self.view.show(frame, asked=self._wishes.now.number)
 
     def close(self) -> None:
         """End the simulation."""

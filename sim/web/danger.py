@@ -103,15 +103,22 @@ class Danger:
         _draw(self._rays, self.rays, ends, np.repeat(colours[:, None], 2, axis=1))
 
     def _colour(self, dangers: Array) -> None:
+        """Links in danger's colours; the robot's own ones are taken out of it then, since a robot may be orange."""
         medium, high = self.thresholds
         for body, meshes in self._bodies.coloured.items():
-            links = self._links.get(body, [])
-            danger = max((float(dangers[link]) for link in links), default=0.0) if self.colours else 0.0
+            danger = max((float(dangers[link]) for link in self._links.get(body, [])), default=0.0)
             share = SHARE * min(danger / medium, 1.0)
             wanted = 255.0 * danger_colour(danger, medium, high)
             for mesh, own in meshes:
-                red, green, blue = np.round((1.0 - share) * np.array(own) + share * wanted).astype(int).tolist()
+                mixed = (1.0 - share) * grey(own) + share * wanted if self.colours else np.array(own)
+                red, green, blue = np.round(mixed).astype(int).tolist()
                 mesh.color = (red, green, blue)
+
+
+def grey(colour: tuple[int, int, int]) -> Array:
+    """A light grey for a colour, darker for a darker one, with a little of it left (3,)."""
+    luma = float(np.dot((0.30, 0.59, 0.11), colour)) / 255.0
+    return 0.12 * np.array(colour) + 0.88 * 235.0 * np.sqrt(luma)
 
 
 def _draw(handle: Any, wanted: bool, points: Array, colours: NDArray[np.uint8]) -> None:

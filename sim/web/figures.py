@@ -22,7 +22,7 @@ WINDOW = 20.0  # of the plots [s]
 NUMBERS, PLOTS, WORDS = 0.1, 0.2, 0.4  # least time between two of each [s]
 BLUE, ORANGE, YELLOW, RED, GREY = "#2f7fd1", "#e0701b", "#d99a00", "#d5352f", "#8a9199"
 REGIMES = {"low": "#2a8c4a", "medium": "#b67d00", "high": "#c22f2f"}
-HEIGHT = 148  # of a plot [px]
+HEIGHT = 118  # of a plot [px]
 
 
 class Numbers:
@@ -47,12 +47,13 @@ class Numbers:
             self.ticks.record(tick)
             self.cycles.record(cycle)
 
-    def show(self, frame: Frame, thresholds: tuple[float, float]) -> None:
+    def show(self, frame: Frame, thresholds: tuple[float, float], asked: int = 0) -> None:
         """Show a frame's.
 
         Args:
             frame: The frame.
             thresholds: From where danger is medium, and high.
+            asked: Number of the newest wish.
         """
         tick, row = frame.tick, frame.row
         colour = REGIMES.get(tick.regime.split("-")[0], GREY)
@@ -87,7 +88,9 @@ class Numbers:
             f'<div id="qp-note" style="color:{ORANGE};font-size:.85em;overflow-wrap:anywhere">'
             f"{_escaped(frame.note)}</div>"
             f'<span id="qp-joints" style="display:none">{joints}</span>'
-            f'<span id="qp-wish" style="display:none">{frame.wish} {frame.since:.6f}</span></div>'
+            f'<span id="qp-wish" style="display:none">{frame.wish} {frame.since:.6f}</span>'
+            f'<span id="qp-exact" style="display:none">{tick.reference.time:.3f}</span>'
+            f'<span id="qp-asked" style="display:none">{asked}</span></div>'
         )
 
 

@@ -112,12 +112,13 @@ class View:
         self.plots.add(frame.row)
         self.numbers.take(frame)
 
-    def show(self, frame: Frame, at_once: bool = False) -> None:
+    def show(self, frame: Frame, at_once: bool = False, asked: int = 0) -> None:
         """Draw a frame, as far as it is time to.
 
         Args:
             frame: The frame.
             at_once: Draw all of it now.
+            asked: Number of the newest wish.
         """
         if self._drawn() or at_once:
             data, scene = self._data, self._scene
@@ -131,7 +132,7 @@ class View:
                 self._bodies.show(data)
                 self._danger.show(frame.tick, frame.q)
         if self._told() or at_once:
-            self.numbers.show(frame, self.thresholds)
+            self.numbers.show(frame, self.thresholds, asked)
         if self._plotted() or at_once:
             self.plots.show(self.thresholds)
         if self._said() or at_once:

@@ -1,133 +1,33 @@
-"""A real browser, and `qpsafe web` in a process of its own, for tests marked `web`."""
+"""A real browser, pages in it, and commands that serve them, for tests marked `web`."""
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-
-from qpsafe.sim.web.view import ANGLE, EYE, LOOK
-
-#: Without a display and a graphics card: WebGL by software.
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-]
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-SIZE = {"width": 1280, "height": 720}
-READY = 120.0  # to load, and to compile if need be [s]
-
-
-def chromium() -> str | None:
-    """Where Chromium is; None where there is none."""
-    return next((path for name in NAMES if (path := shutil.which(name)) is not None), None)
+from browser import NAMES, SIZE, Program, Tab, chromium, launched
 
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """Chromium, steered by Playwright."""
+    """Chromium."""
     path = chromium()
     if path is None:
         pytest.skip(f"no Chromium here (looked for {', '.join(NAMES)})")
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'qpsafe[browser]'")
-    with playwright.sync_playwright() as steered:
-        found = steered.chromium.launch(executable_path=path, args=FLAGS)
+    pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'qpsafe[browser]'")
+    with launched(path) as found:
         yield found
-        found.close()
-
-
-class Tab:
-    """A page, with whatever its console complained about.
-
-    Args:
-        browser: Chromium.
-        address: What is opened.
-    """
-
-    def __init__(self, browser: Any, address: str) -> None:
-        self.complaints: list[str] = []
-        self.page = browser.new_page(viewport=SIZE)
-        self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(address)
-        self.page.wait_for_selector("#qp-distance", timeout=1e3 * READY)
-
-    def text(self, key: str) -> str:
-        """What stands in an element with an id."""
-        return str(self.page.locator(f"#{key}").text_content(timeout=1e3 * READY))
-
-    def number(self, key: str) -> float:
-        """The first number in it."""
-        found = re.search(r"-?\d+\.?\d*", self.text(key))
-        assert found is not None, self.text(key)
-        return float(found[0])
-
-    def joints(self) -> list[float]:
-        """Where the robot's joints are [rad]."""
-        return [float(word) for word in self.text("qp-joints").split()]
-
-    def until(self, true: Callable[[], bool], patience: float = READY) -> None:
-        """Wait until something is true."""
-        end = time.monotonic() + patience
-        while not true():
-            assert time.monotonic() < end, f"waited {patience:g} s; {self.text('qp-note')}"
-            self.page.wait_for_timeout(50)
-
-    def at(self, point: tuple[float, float, float]) -> tuple[float, float]:
-        """Where a point of the scene is on the screen, as the camera stands at first [px]."""
-        box = self.page.locator("canvas").first.bounding_box()
-        eye, forward = np.array(EYE), np.subtract(LOOK, EYE)
-        forward = forward / np.linalg.norm(forward)
-        right = np.cross(forward, (0.0, 0.0, 1.0))
-        right /= np.linalg.norm(right)
-        seen = np.subtract(point, eye)
-        scale = 0.5 * box["height"] / np.tan(np.radians(0.5 * ANGLE)) / (seen @ forward)
-        x, y = scale * (seen @ right), scale * (seen @ np.cross(right, forward))
-        return box["x"] + 0.5 * box["width"] + x, box["y"] + 0.5 * box["height"] - y
-
-    def drag(self, start: tuple[float, float, float], end: tuple[float, float, float], steps: int = 12) -> None:
-        """Drag along an arrow with the mouse, from a point of the scene to another."""
-        mouse = self.page.mouse
-        here, there = self.at(start), self.at(end)
-        mouse.move(*here)
-        self.page.wait_for_timeout(400)  # until the arrow knows of the mouse
-        mouse.down()
-        for k in range(1, steps + 1):
-            mouse.move(*(a + (b - a) * k / steps for a, b in zip(here, there, strict=True)))
-            self.page.wait_for_timeout(60)
-        mouse.up()
-
-    def choose(self, label: str, option: str) -> None:
-        """Choose in a dropdown of the open tab."""
-        box = self.page.get_by_label(label, exact=True)
-        box.first.click()
-        self.page.get_by_role("option", name=option, exact=True).click()
-
-    def open(self, name: str) -> None:
-        """Open a tab of the panel."""
-        self.page.get_by_role("tab", name=name, exact=True).click()
 
 
 @pytest.fixture
-def tab(browser: Any) -> Iterator[Callable[[str], Tab]]:
+def tab(browser: Any) -> Iterator[Callable[..., Tab]]:
     """Opens pages; at the end nothing may have been complained about."""
     opened: list[Tab] = []
 
-    def make(address: str) -> Tab:
-        opened.append(Tab(browser, address))
+    def make(address: str, size: dict[str, int] = SIZE) -> Tab:
+        opened.append(Tab(browser, address, size))
         return opened[-1]
 
     yield make
@@ -137,50 +37,13 @@ def tab(browser: Any) -> Iterator[Callable[[str], Tab]]:
     assert complaints == []
 
 
-class Program:
-    """A qpsafe command that serves a page.
-
-    Args:
-        words: What is typed after `qpsafe`.
-        folder: Where.
-    """
-
-    def __init__(self, words: list[str], folder: Path) -> None:
-        code = "from qpsafe.cli.main import main; main()"
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "NO_COLOR": "1"}
-        self.log = folder / "said.txt"
-        with self.log.open("wb") as said:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", code, *words], cwd=folder, env=environment, stdout=said, stderr=said
-            )
-        end = time.monotonic() + READY
-        while (found := re.search(r"http://\S+", self.said)) is None:
-            assert self.process.poll() is None, self.said
-            assert time.monotonic() < end, self.said
-            time.sleep(0.1)
-        self.address = found[0]
-
-    @property
-    def said(self) -> str:
-        """What it has printed."""
-        return self.log.read_text("utf-8")
-
-    def interrupt(self) -> int:
-        """Press Ctrl-C, and wait for its exit code."""
-        self.process.send_signal(signal.SIGINT)
-        try:
-            return self.process.wait(30.0)
-        finally:
-            self.process.kill()
-
-
 @pytest.fixture
 def program(tmp_path: Path) -> Iterator[Callable[..., Program]]:
-    """Starts commands; ends them."""
+    """Starts commands that serve pages; ends them."""
     started: list[Program] = []
 
     def start(*words: str) -> Program:
-        folder = tmp_path / str(len(started))
+        folder = tmp_path / f"program-{len(started)}"
         folder.mkdir()
         started.append(Program(list(words), folder))
         return started[-1]
