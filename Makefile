@@ -9,16 +9,22 @@ SHARED := -n 2 --dist loadfile --no-loadscope-reorder
 # tests start dozens of Pythons: each would compile every source again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow dev lint docs figures bench dist clean
+.PHONY: demo web test test-web test-slow dev lint docs figures bench dist clean
 
 demo: $(VENV)/.demo ## the paper's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
 
+web: $(VENV)/.web ## a robot among people, in the browser
+	$(BIN)/qpsafe web --open
+
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest $(SHARED) -m "not slow"
+	$(BIN)/python -m pytest $(SHARED) -m "not slow and not web"
+
+test-web: $(VENV)/.browser ## the page in a real browser: Chromium, where it is installed
+	$(BIN)/python -m pytest -m web -p no:xdist tests/sim/web
 
 test-slow: $(VENV)/.dev
-	$(BIN)/python -m pytest $(SHARED)
+	$(BIN)/python -m pytest $(SHARED) -m "not web"
 
 dev: $(VENV)/.dev ## everything for working on the project
 	@echo "ready: $(BIN)/qpsafe --help"
@@ -64,9 +70,17 @@ $(VENV)/.demo: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[video]'
 	@touch $@
 
+$(VENV)/.web: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[web]'
+	@touch $@
+
+$(VENV)/.browser: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,browser]'
+	@touch $@
+
 $(VENV)/.dev: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	@touch $@ $(VENV)/.demo $(VENV)/.docs
+	@touch $@ $(VENV)/.demo $(VENV)/.docs $(VENV)/.web
 
 $(VENV)/.docs: $(VENV)/bin/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'

@@ -42,7 +42,7 @@ sim.experiments sim.sick sim.placement
 sim.campaign.people
 sim.campaign
 sim.campaign.report
-sim.irc5
+sim.irc5 sim.web
 cli.common cli.sheet cli.outputs
 cli.check
 cli cli.demos

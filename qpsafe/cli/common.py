@@ -76,18 +76,12 @@ def make_law(name: LawName, projection: ProjectionName, solver: str | None = Non
 
     Args:
         name: Which law.
-        projection: Of the nullspace law; the others take no notice.
+        projection: Of the hierarchical law; the others take no notice.
         solver: Of the hierarchical law; its default if None.
     """
-    from qpsafe.laws.hierarchical import HierarchicalLaw
-    from qpsafe.laws.nullspace import NullspaceLaw
-    from qpsafe.laws.weighted import WeightedLaw
+    from qpsafe.laws.by_name import law_named
 
-    if name is LawName.nullspace:
-        return NullspaceLaw()
-    if name is LawName.weighted:
-        return WeightedLaw(solver=solver)
-    return HierarchicalLaw(projection.value, solver=solver)
+    return law_named(name.value, projection.value, solver)
 
 
 def console(json_output: bool) -> Console:

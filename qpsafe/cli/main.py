@@ -23,6 +23,7 @@ from qpsafe.cli import (
     sick_sensors,
     story,
     stream,
+    web,
 )
 from qpsafe.cli.campaign.app import app as campaigns
 from qpsafe.cli.common import Group, console
@@ -46,6 +47,7 @@ app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("story")(story.story)
 app.command("replay")(replay.replay)
+app.command("web")(web.web)
 app.command("place")(place.place)
 app.command("sick-sensors")(sick_sensors.sick_sensors)
 app.command("stream")(stream.stream)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from qpsafe.sim.recording.run_file import RunFile
     from qpsafe.sim.replay.replay import Replay
+    from qpsafe.sim.web.player import Kept
 
 
 def replay(
@@ -25,6 +26,12 @@ def replay(
         Path | None, typer.Option(help="Also film the recorded run into this mp4.", callback=output_file(".mp4"))
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Also show it in MuJoCo's viewer; needs a display.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="Then show it in the browser, with a time slider.")] = False,
+    web_host: Annotated[str, typer.Option(help="Address of the page; any but this computer's own needs a token.")] = (
+        "127.0.0.1"
+    ),
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0 for any free one.")] = 8080,
+    web_token: Annotated[str | None, typer.Option(help="Whoever opens it must know; made up where needed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Run the controller again on a run's recorded inputs and compare every answer with the recorded one, bit by bit.
@@ -33,6 +40,11 @@ def replay(
     versions or robot files have changed since.
     """
     screen = console(json)
+    if web:
+        from qpsafe.sim.web.server import check_port, need_viser
+
+        need_viser()
+        check_port(web_host, web_port)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.recording.run_file import read_run
     from qpsafe.sim.replay.replay import replay as run_again
@@ -44,6 +56,11 @@ def replay(
         watchers: list[Any] = []
         if video is not None or view:
             watchers += _watchers(run, experiment, video, view, stack)
+        if web:
+            from qpsafe.sim.web.player import Kept
+
+            kept = Kept(run, experiment)
+            watchers.append(kept.watch)
         task = progress.add_task(file.name, total=run.ticks)
 
         def watch(*state: Any) -> None:
@@ -58,8 +75,26 @@ def replay(
         _show(found, run, screen)
         if video is not None:
             screen.print(f"written to {video}")
+    if web:
+        _serve(kept, web_host, web_port, web_token, screen)
     if not found.same:
         raise typer.Exit(1)
+
+
+def _serve(kept: Kept, host: str, port: int, token: str | None, screen: Console) -> None:
+    """Show the run in the browser until Ctrl-C."""
+    from qpsafe.cli.web import announce, asked_to_leave
+    from qpsafe.sim.web.player import Player
+    from qpsafe.sim.web.server import Page, token_for
+
+    page = Page(host, port, "qpsafe replay", token_for(host, token))
+    try:
+        player = Player(kept, page)
+        announce(screen, host, page.address)
+        with asked_to_leave() as leave:
+            player.serve(leave)
+    finally:
+        page.close()
 
 
 def _watchers(run: RunFile, experiment: Any, video: Path | None, view: bool, stack: ExitStack) -> list[Any]:

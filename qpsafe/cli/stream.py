@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.realtime import Grant
     from qpsafe.irc5.records.log import ReferenceWriter
+    from qpsafe.sim.web.watch import Watch
+    from qpsafe.tick import Tick
 
 
 class Experiment(StrEnum):
@@ -84,6 +86,12 @@ def stream(
     log: Annotated[
         Path | None, typer.Option(help="Log of the references, .csv or .qpref.", callback=output_file(".csv", ".qpref"))
     ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Show it in the browser; nothing comes back from there.")] = False,
+    web_host: Annotated[str, typer.Option(help="Address of the page; any but this computer's own needs a token.")] = (
+        "127.0.0.1"
+    ),
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Its port.")] = 8080,
+    web_token: Annotated[str | None, typer.Option(help="Whoever opens it must know; made up where needed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """Stream joint references to an IRC5 at its own pace (250 Hz). Ctrl-C ramps out before leaving.
@@ -137,11 +145,20 @@ def stream(
         dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None
         if requests.leave:
             raise typer.Exit(130)
+        watch = _watch(robot, experiment, (web_host, web_port, web_token), screen) if web else None
+        if watch is not None:  # begun before anything is asked for that it would inherit
+            stack.callback(watch.close)
         grants += _grants(real_time, priority, [spoken.thread, written.thread])
         speaker = Speaker(spoken, streamer, inlet, status=sys.stderr.isatty() and not json)
         supervisor = Supervisor(on_transition=speaker.say)
         loop = StreamLoop(controller, streamer.session, supervisor, LoopRules(manual=acknowledge is Acknowledge.manual))
         _announce(screen, grants, streamer.address, inlet, blind)
+
+        def on_tick(tick: Tick | None) -> None:
+            if writer is not None and tick is not None:
+                writer.write(tick.reference)
+            if watch is not None:
+                watch.observe(tick, loop.measured, str(supervisor.state), streamer.response)
 
         requests.driving = True
         run = run_stream(
@@ -153,7 +170,7 @@ def stream(
             duration=duration,
             patience=patience or math.inf,
             requests=requests,
-            on_tick=None if writer is None else lambda tick: None if tick is None else writer.write(tick.reference),
+            on_tick=None if writer is None and watch is None else on_tick,
             on_events=None if output is None else output.send,
             on_second=lambda run: speaker.second(run, loop),
         )
@@ -171,6 +188,24 @@ def stream(
             spoken.write("qpsafe: the report could not be written as a whole\n")
         if not (spoken.close() and written.close() and result["good"]):
             raise typer.Exit(1)
+
+
+def _watch(
+    robot: str, experiment: Experiment | None, at: tuple[str, int, str | None], screen: Any
+) -> Watch:  # fmt: skip
+    """The page, which only reads; waits until it answers, so that a browser may be opened before the robot moves."""
+    from qpsafe.cli.web import announce
+    from qpsafe.sim.web.server import address_of, token_for
+    from qpsafe.sim.web.watch import Watch
+
+    host, port, token = at
+    token = token_for(host, token)
+    watch = Watch(robot, None if experiment is None else experiment.value, host, port, token)
+    if watch.wait():
+        announce(screen, host, address_of(host, port, token))
+    else:
+        screen.print("no page: its process does not answer", style="yellow")
+    return watch
 
 
 def _writer(path: Path, joints: int) -> ReferenceWriter:

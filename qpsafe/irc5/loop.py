@@ -72,6 +72,7 @@ class StreamLoop:
 
     Attributes:
         tick: Of the controller, the last one; None before.
+        measured: Where the robot was in the last cycle (n,) [rad]; None before.
         events: Names of the task program's events since they were last taken.
     """
 
@@ -90,6 +91,7 @@ class StreamLoop:
         self.supervisor = Supervisor() if supervisor is None else supervisor
         self.rules = LoopRules() if rules is None else rules
         self.tick: Tick | None = None
+        self.measured: Array | None = None
         self.events: list[str] = []
         self._anew = True  # the controller must start from the measured pose
         self._restarted = False  # the robot has, since the last stop
@@ -142,6 +144,7 @@ class StreamLoop:
             ages: How old they are (k,) [s].
         """
         self._watch_robot(cycle)
+        self.measured = cycle.packet.q
         supervisor = self.supervisor
         # a reference that still gives way to what holds the robot is not at rest
         self._settled = self._settled + 1 if supervisor.state is State.STOPPED and self.session.at_rest else 0

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sensing.detection import nearest_link
 from qpsafe.sensing.sharp import SharpConverter
-from qpsafe.sim.engine.bodies import Bodies
+from qpsafe.sim.engine.sight import Sight
 from qpsafe.sim.engine.spot_rays import SpotReader
 from qpsafe.sim.engine.spot_table import SpotTable
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
@@ -23,7 +22,6 @@ Array = NDArray[np.float64]
 
 LOOK = 5.0  # how far a Sharp sensor is moved by what it sees [m]
 NEAR = 0.8  # how far monitors with perfect sight look: nothing limits their speed farther away [m]
-SIGHT = 2.0  # how far perfect sight looks [m]
 UNITS = 0  # seed of the units: the robot has the same sensors in all trials, noise is each trial's own
 
 
@@ -45,9 +43,7 @@ class Senses:
         self._reader = SpotReader(station.world, self.table)
         #: Whether readings are the true distances.
         self.ideal = sensor != "sharp"
-        robot = station.robot
-        self._bodies = Bodies(station.world, robot)
-        self._link_bodies = np.array([robot.mounting(end)[0] for _, end in robot.wire_frames])
+        self._sight = Sight(station.world, station.robot)
         self._sharp: SharpSensors | None = None
         if sensor == "sharp":
             self._sharp = SharpSensors(len(spots), SharpModel(), UNITS, noise=seed)
@@ -72,20 +68,11 @@ class Senses:
 
     def everywhere(self, q: Array, k: int) -> Array:
         """Where every part of everybody is nearest to each body of the robot at tick k (p, 3) [m], as far as `NEAR`."""
-        return self._bodies.to_each(self._station.robot.at(q), self.tracks.row(k), NEAR).on_other
+        return self._sight.bodies.to_each(self._station.robot.at(q), self.tracks.row(k), NEAR).on_other
 
     def nearest(self, q: Array, k: int) -> Array:
-        """Where everybody is nearest to each link of the robot at tick k (p, 3) [m], as far as `SIGHT`.
-
-        A point belongs to the link of the wire that it is nearest to, as points given to a controller do; it counts if
-        it is the nearest one of this link's body, so that nobody counts once for every body of the robot.
-        """
-        state = self._station.robot.at(q)
-        near = self._bodies.to_people(state, self.tracks.row(k), SIGHT)
-        if not len(near.distance):
-            return near.on_other
-        links = nearest_link(near.on_other, state.wire(np.zeros_like(q)))
-        return near.on_other[self._link_bodies[links] == near.body]
+        """Where everybody is nearest to each link of the robot at tick k (p, 3) [m], see `Sight`; q (n,) [rad]."""
+        return self._sight.points(self._station.robot.at(q), self.tracks.row(k))
 
 
 @cache

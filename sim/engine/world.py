@@ -116,7 +116,7 @@ class World:
                 or a mesh without volume.
         """
         model, data = scene.model, scene.make_data()
-        owners, loose = _owners(scene)
+        owners, loose = owners_of(scene)
         poses = [*scene.robot.at(scene.robot.home).body_poses(), *(_pose(data.xpos[b], data.xmat[b]) for b in loose)]
         geoms = [
             g
@@ -172,7 +172,7 @@ class World:
 _CHOICES, _ROWS = ("robot", "furniture", "floors"), ("geoms", "index", "shapes")
 
 
-def _owners(scene: Scene) -> tuple[list[int], list[int]]:
+def owners_of(scene: Scene) -> tuple[list[int], list[int]]:
     """Body of the world that each body of the scene belongs to, and the scene's bodies that are not the robot's.
 
     Joints that are held do not move their bodies.

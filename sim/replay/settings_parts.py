@@ -1,4 +1,4 @@
-"""A user's thresholds and evasion as plain data, and again from them."""
+"""A user's thresholds, evasion and gate as plain data, and again from them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ def part_settings(experiment: Control) -> dict[str, Any]:
         if part is not None and type(part) is not usual:
             expected = f"{'none' if key == 'tasks' else usual.__name__}: replay has to build it again"
             raise ConfigurationError("settings_of", key, type(part).__name__, expected)
-    activation, evasion = experiment.activation, experiment.evasion
+    activation, evasion, gate = experiment.activation, experiment.evasion, experiment.gate
+    if gate not in (None, "off"):
+        raise ConfigurationError("settings_of", "gate", gate, "none, or 'off': replay has to build it again")
     return {
+        "gate": gate,
         "thresholds": None if activation is None else [[t.delta, t.epsilon] for t in activation.thresholds],
         "evasion": None
         if evasion is None
@@ -40,4 +43,5 @@ def parts_of(robot: Robot, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "activation": None if thresholds is None else Activation(tuple(Threshold(*pair) for pair in thresholds)),
         "evasion": None if evasion is None else Evasion(n=robot.nq, **evasion),
+        "gate": settings.get("gate"),
     }

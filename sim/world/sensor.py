@@ -1,4 +1,4 @@
-"""What the controller gets to read in a simulation: perfect distances, or what Sharp sensors make of them."""
+"""What the controller is told in a simulation: perfect distances, what Sharp sensors make of them, or all there is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.sharp import SharpConverter
+from qpsafe.sim.engine.tracks import people_of
 from qpsafe.sim.world.rays import SpotRays
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
     from qpsafe.sensing.spots import SpotArray
     from qpsafe.sim.world.scene import Scene
 
-SENSORS = ("ideal", "sharp")
+SENSORS = ("ideal", "sharp", "perfect")
 
 
 class Sensor(Protocol):
-    """Reads all spots once a tick."""
+    """Asked once a tick."""
 
     def read(self, data: Any, state: RobotState) -> NDArray[np.float64]:
-        """Distances (k,) [m], given the scene's state and the robot in the same configuration."""
+        """Distances (k,) or points (p, 3) [m], given the scene's state and the robot in the same configuration."""
 
 
 class IdealSensor:
@@ -62,15 +63,37 @@ class SharpSensor:
         return self.converter.distances(self.voltages)
 
 
-def make_sensor(kind: str, scene: Scene, spots: SpotArray, seed: int = 0) -> Sensor:
-    """The sensor of the given kind, `ideal` or `sharp`.
+class PerfectSight:
+    """Where everybody is nearest to each link, as points: for robots without sensors, and to compare.
 
     Args:
-        kind: ``ideal`` or ``sharp``.
+        scene: With the robot and the people.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        from qpsafe.sim.engine.sight import Sight  # compiled when it is asked for
+        from qpsafe.sim.engine.world import World
+
+        self._scene, self._sight = scene, Sight(World.of(scene), scene.robot)
+
+    def read(self, data: Any, state: RobotState) -> NDArray[np.float64]:
+        """Points (p, 3) [m]."""
+        return self._sight.points(state, people_of(self._scene, data))
+
+
+def make_sensor(kind: str, scene: Scene, spots: SpotArray | None, seed: int = 0) -> Sensor:
+    """The sensor of the given kind.
+
+    Args:
+        kind: ``ideal``, ``sharp``, or ``perfect``, which needs no spots.
         scene: What is sensed.
         spots: The distance sensors.
         seed: Of a Sharp sensor's noise and spread.
     """
+    if kind == "perfect":
+        return PerfectSight(scene)
+    if spots is None:
+        raise ConfigurationError("FixedExperiment", "sensor", kind, "perfect, for a robot without distance sensors")
     rays = SpotRays(scene, spots)
     if kind == "ideal":
         return IdealSensor(rays)

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.robot.state import RobotState
-from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
+from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop, Moment
 from qpsafe.sim.experiments.fixed.settings import FixedSettings
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.recording.log import Recorder, RunLog
-from qpsafe.sim.world.distance import TrueDistances
+from qpsafe.sim.world.distance import Distance, TrueDistances
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
 from qpsafe.tasks.rotation import euler_zyx, log3
@@ -36,31 +37,15 @@ class FixedExperiment(FixedSettings):
         Raises:
             SimulationFailedError: MuJoCo reported bad values.
         """
-        robot, scene, loop = self.robot, self.scene, FixedLoop(self)
-        controller, plant = loop.controller, loop.plant
-        assert controller.spots is not None
-        recorder, gaps = Recorder(controller.dt, controller.spots.names), TrueDistances(scene)
-        for _ in range(round(self.duration / controller.dt)):
-            tick, q, qd, distances, state = loop.step()
-            goals = {name: target.sample(tick.path_time).pose for name, target in self.references.items()}
-            commanded = robot.at(tick.reference.q)
-            board, person = gaps.measure(plant.data)
-            measured = [pose_error(state.pose(name), goal) for name, goal in goals.items()]
-            recorder.add(
-                tick,
-                q,
-                qd,
-                distances,
-                (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
-                np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
-                (board.distance, person.distance),
-                errors=own_errors(self, commanded, goals),
-                metrics=self.measured(tick, scene, plant),
-            )
+        scene, loop = self.scene, FixedLoop(self)
+        plant, notes, gaps = loop.plant, Notes(self, loop), TrueDistances(scene)
+        for _ in range(round(self.duration / loop.controller.dt)):
+            moment = loop.step()
+            notes.add(moment, gaps.measure(plant.data))
             if observer is not None:
-                observer(tick, scene, plant)
+                observer(moment.tick, scene, plant)
             loop.advance()
-        return recorder.finish()
+        return notes.finish()
 
     def board_distance_without_controller(self) -> NDArray[np.float64]:
         """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
@@ -71,6 +56,53 @@ class FixedExperiment(FixedSettings):
             scene.place_people(data, poses(k))
             result[k] = gaps.board(data).distance
         return result
+
+
+class Notes:
+    """What a run of the first or second experiment is remembered by.
+
+    Args:
+        experiment: Its settings.
+        loop: What runs.
+
+    Raises:
+        ConfigurationError: There are no readings of sensors to be written down.
+    """
+
+    def __init__(self, experiment: FixedExperiment, loop: FixedLoop) -> None:
+        self._experiment, self._plant = experiment, loop.plant
+        controller = loop.controller
+        if controller.spots is None or experiment.sensor == "perfect":
+            expected = "ideal or sharp: a run is remembered by what its sensors read"
+            raise ConfigurationError("FixedExperiment", "sensor", experiment.sensor, expected)
+        self._recorder = Recorder(controller.dt, controller.spots.names)
+
+    def add(self, moment: Moment, gaps: tuple[Distance, Distance]) -> None:
+        """Write down a tick.
+
+        Args:
+            moment: The tick.
+            gaps: True distances to boards and to people, as `TrueDistances.measure` finds them at it.
+        """
+        experiment, tick = self._experiment, moment.tick
+        goals = {name: target.sample(tick.path_time).pose for name, target in experiment.references.items()}
+        commanded = experiment.robot.at(tick.reference.q)
+        measured = [pose_error(moment.state.pose(name), goal) for name, goal in goals.items()]
+        self._recorder.add(
+            tick,
+            moment.q,
+            moment.qd,
+            moment.distances,
+            (np.concatenate([error[0] for error in measured]), np.concatenate([error[1] for error in measured])),
+            np.concatenate([euler_error(commanded.pose(name), goal) for name, goal in goals.items()]),
+            (gaps[0].distance, gaps[1].distance),
+            errors=own_errors(experiment, commanded, goals),
+            metrics=experiment.measured(tick, experiment.scene, self._plant),
+        )
+
+    def finish(self) -> RunLog:
+        """The run so far."""
+        return self._recorder.finish()
 
 
 def own_errors(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from qpsafe.danger.thresholds import robot_activation
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.robot.state import RobotState
 from qpsafe.sim.people.ahead import PosesAhead
+from qpsafe.sim.people.person import PersonPose
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.sensor import make_sensor
@@ -31,7 +32,7 @@ Fault = Callable[[Array], tuple[Array, Array | None]]
 
 
 class Moment(NamedTuple):
-    """One tick of a run: what the controller said, and what it was told."""
+    """One tick of a run: what the controller said, and what it was told: distances (k,), or points (p, 3)."""
 
     tick: Tick
     q: Array
@@ -67,10 +68,8 @@ class FixedLoop:
             barrier=None if experiment.cap is None else DangerBarrier(experiment.cap),
             **parts,
         )
-        spots = self.controller.spots
-        assert spots is not None
-        self.sensor = make_sensor(experiment.sensor, scene, spots, experiment.seed)
-        self.poses = PosesAhead(self.walk.people, self.controller.dt)
+        self.sensor = make_sensor(experiment.sensor, scene, self.controller.spots, experiment.seed)
+        self.poses: Callable[[int], Sequence[PersonPose]] = PosesAhead(self.walk.people, self.controller.dt)
         self.k = 0
 
     def step(self, fault: Fault | None = None) -> Moment:

@@ -40,7 +40,8 @@ class FixedSettings(Control):
         lag: Control lag of the plant [s].
         limits: Whether the joint limits are on.
         duration: Length [s].
-        sensor: ``ideal`` distances, or those of ``sharp`` sensors.
+        sensor: ``ideal`` distances, those of ``sharp`` sensors, or ``perfect``: where everybody is nearest to each
+            link, as points; that needs no sensors.
         rules: What counts as danger, and what sick sensors do; None for the default, see above.
         cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
@@ -63,7 +64,7 @@ class FixedSettings(Control):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.robot.spots_path is None:
+        if self.robot.spots_path is None and self.sensor != "perfect":
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:
             self.choreography = robot_stage(self.robot).choreography

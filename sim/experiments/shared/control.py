@@ -15,6 +15,7 @@ from qpsafe.errors import ConfigurationError
 if TYPE_CHECKING:
     from qpsafe.danger.activation import Activation
     from qpsafe.danger.evasion import Evasion
+    from qpsafe.gate.rules import VerifiedMotion
     from qpsafe.sim.world.plant import Plant
     from qpsafe.sim.world.scene import Scene
     from qpsafe.tasks.task import Task
@@ -33,6 +34,7 @@ class Control:
             tool's orientation. Errors in the log are of the tools all the same.
         activation: Thresholds of the tasks; by default the robot's.
         evasion: The admittance (16), None for the controller's default. Every run begins with one at rest.
+        gate: The last step, None for the controller's default, "off" for none.
         metrics: What else to write down at every tick, by name: functions of the tick, the scene and the plant. See
             `RunLog.metrics`.
     """
@@ -40,6 +42,7 @@ class Control:
     tasks: Sequence[Task] | None = None
     activation: Activation | None = None
     evasion: Evasion | None = None
+    gate: VerifiedMotion | str | None = None
     metrics: Mapping[str, Metric] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -49,9 +52,9 @@ class Control:
                 raise ConfigurationError(type(self).__name__, f"metrics[{name!r}]", metric, expected)
 
     def parts(self) -> dict[str, Any]:
-        """Thresholds and evasion as arguments of `SafetyController`."""
+        """Thresholds, evasion and gate as arguments of `SafetyController`."""
         evasion = copy.deepcopy(self.evasion)  # it remembers a velocity: no two runs share it
-        return {"activation": self.activation, "evasion": evasion}
+        return {"activation": self.activation, "evasion": evasion, "gate": self.gate}
 
     def measured(self, tick: Tick, scene: Scene, plant: Plant) -> dict[str, NDArray[np.float64]]:
         """All metrics of a tick.

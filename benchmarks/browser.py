@@ -1,0 +1,187 @@
+"""A real browser without a display, and commands that serve pages in processes of their own: for tests and timing."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qpsafe.sim.web.view import ANGLE, EYE, LOOK
+
+#: Without a display and a graphics card: WebGL by software.
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+SIZE = {"width": 760, "height": 620}  # little of the scene: it is drawn by software
+WIDE = {"width": 1180, "height": 640}
+READY = 60.0  # to load, and to compile if need be [s]
+
+
+def chromium() -> str | None:
+    """Where Chromium is; None where there is none."""
+    return next((path for name in NAMES if (path := shutil.which(name)) is not None), None)
+
+
+@contextmanager
+def launched(path: str) -> Iterator[Any]:
+    """Chromium, steered by Playwright."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as steered:
+        browser = steered.chromium.launch(executable_path=path, args=FLAGS)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+class Tab:
+    """A page, with whatever its console complained about.
+
+    Args:
+        browser: Chromium.
+        address: What is opened.
+        size: Width and height [px].
+    """
+
+    def __init__(self, browser: Any, address: str, size: dict[str, int] | None = None) -> None:
+        self.complaints: list[str] = []
+        self.page = browser.new_page(viewport=size or SIZE)
+        self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(address)
+        self.page.wait_for_selector("#qp-distance", timeout=1e3 * READY)
+
+    def text(self, key: str) -> str:
+        """What stands in an element with an id."""
+        return str(self.page.locator(f"#{key}").text_content(timeout=1e3 * READY))
+
+    def number(self, key: str) -> float:
+        """The first number in it."""
+        found = re.search(r"-?\d+\.?\d*", self.text(key))
+        assert found is not None, self.text(key)
+        return float(found[0])
+
+    def joints(self) -> list[float]:
+        """Where the robot's joints are [rad]."""
+        return [float(word) for word in self.text("qp-joints").split()]
+
+    def until(self, true: Callable[[], bool], patience: float = READY) -> None:
+        """Wait until something is true."""
+        end = time.monotonic() + patience
+        while not true():
+            assert time.monotonic() < end, f"waited {patience:g} s; {self.text('qp-note')}"
+            self.page.wait_for_timeout(50)
+
+    def at(self, point: tuple[float, float, float]) -> tuple[float, float]:
+        """Where a point of the scene is on the screen, as the camera stands at first [px]."""
+        box = self.page.locator("canvas").first.bounding_box()
+        eye, forward = np.array(EYE), np.subtract(LOOK, EYE)
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        seen = np.subtract(point, eye)
+        scale = 0.5 * box["height"] / np.tan(np.radians(0.5 * ANGLE)) / (seen @ forward)
+        x, y = scale * (seen @ right), scale * (seen @ np.cross(right, forward))
+        return box["x"] + 0.5 * box["width"] + x, box["y"] + 0.5 * box["height"] - y
+
+    def drag(self, start: tuple[float, float, float], end: tuple[float, float, float], steps: int = 12) -> None:
+        """Drag along an arrow with the mouse, from a point of the scene to another."""
+        mouse = self.page.mouse
+        here, there = self.at(start), self.at(end)
+        mouse.move(*here)
+        self.page.wait_for_timeout(400)  # until the arrow knows of the mouse
+        mouse.down()
+        for k in range(1, steps + 1):
+            mouse.move(*(a + (b - a) * k / steps for a, b in zip(here, there, strict=True)))
+            self.page.wait_for_timeout(60)
+        mouse.up()
+
+    def settled(self) -> bool:
+        """Whether the newest wish of the page has been followed."""
+        return self.text("qp-asked") == self.text("qp-wish").split()[0]
+
+    def drag_delays(
+        self, start: tuple[float, float, float], end: tuple[float, float, float], count: int
+    ) -> list[float]:
+        """Times from before a move of the mouse to the end of the first tick that counted with it [s]; single moves."""
+        mouse, delays = self.page.mouse, []
+        here, there = np.array(self.at(start)), np.array(self.at(end))
+        mouse.move(*here)
+        self.page.wait_for_timeout(400)
+        mouse.down()
+        mouse.move(*(here + (there - here) / (count + 1)))
+        self.until(self.settled)
+        for k in range(2, count + 2):
+            self.page.wait_for_timeout(120)  # past what viser holds back
+            known = int(self.text("qp-wish").split()[0])
+            before = time.monotonic()
+            mouse.move(*(here + (there - here) * k / (count + 1)))
+            self.until(lambda known=known: int(self.text("qp-wish").split()[0]) > known)  # type: ignore[misc]
+            delays.append(float(self.text("qp-wish").split()[1]) - before)
+        mouse.up()
+        return delays
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose in a dropdown of the open tab."""
+        box = self.page.get_by_label(label, exact=True)
+        box.first.click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def open(self, name: str) -> None:
+        """Open a tab of the panel."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+
+class Program:
+    """A qpsafe command that serves a page.
+
+    Args:
+        words: What is typed after `qpsafe`.
+        folder: Where.
+        serves: Whether to wait for the address of its page.
+    """
+
+    def __init__(self, words: list[str], folder: Path, serves: bool = True) -> None:
+        code = "from qpsafe.cli.main import main; main()"
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "NO_COLOR": "1"}
+        self.log = folder / "said.txt"
+        with self.log.open("wb") as said:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", code, *words], cwd=folder, env=environment, stdout=said, stderr=said
+            )
+        self.address, end = "", time.monotonic() + READY
+        while serves and (found := re.search(r"http://\S+", self.said)) is None:
+            assert self.process.poll() is None, self.said
+            assert time.monotonic() < end, self.said
+            time.sleep(0.1)
+        if serves and found is not None:
+            self.address = found[0]
+
+    @property
+    def said(self) -> str:
+        """What it has printed."""
+        return self.log.read_text("utf-8")
+
+    def interrupt(self) -> int:
+        """Press Ctrl-C, and wait for its exit code."""
+        self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(30.0)
+        finally:
+            self.process.kill()

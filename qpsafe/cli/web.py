@@ -1,0 +1,114 @@
+"""`qpsafe web`: a robot among people, in the browser."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from qpsafe.cli.common import console
+from qpsafe.cli.outputs import output_folder
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+LOCAL_WARNING = (
+    "WARNING: everybody who reaches {host} and knows the token can use this page; nothing on the way is encrypted"
+)
+
+
+def web(
+    robot: Annotated[
+        str, typer.Option(help="A bundled robot, a robot folder, a URDF or an MJCF file, or PACKAGE:MODEL.")
+    ] = "irb140",
+    program: Annotated[
+        Path | None, typer.Option(help="TOML file of what the tool does; by default it keeps the robot's home pose.")
+    ] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of who comes besides who is dragged.")] = None,
+    host: Annotated[str, typer.Option(help="Address to serve at; any but this computer's own needs a token.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0 for any free one.")] = 8080,
+    token: Annotated[
+        str | None, typer.Option(help="Whoever opens the page must know it; made up where it is needed.")
+    ] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="A dark page.")] = False,
+    open_: Annotated[bool, typer.Option("--open", help="Open it in this computer's browser.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for what is recorded.", callback=output_folder)] = Path("out/web"),
+) -> None:
+    """Watch and play in the browser: drag a person towards the robot, change law and parameters, record.
+
+    The simulation runs at 250 Hz in a process of its own. Ctrl-C ends both.
+    """
+    from qpsafe.irc5 import realtime
+
+    realtime.one_thread()
+    from qpsafe.sim.web.server import Page, check_port, need_viser, token_for
+
+    need_viser()
+    check_port(host, port)
+    screen = console(False)
+    screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+    from qpsafe.sim.web.app import TITLE, App
+    from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
+
+    setup = Setup(robot, HOLD if program is None else str(program), NOBODY if story is None else str(story))
+    setup.experiment().start  # noqa: B018  what is wrong is said before anything is served
+    page = Page(host, port, TITLE, token_for(host, token))
+    try:
+        app = App(setup, page, out, dark)
+        try:
+            announce(screen, host, page.address)
+            if open_:
+                with suppress(webbrowser.Error):
+                    webbrowser.open(page.address)
+            with asked_to_leave() as leave:
+                app.serve(leave)
+        finally:
+            app.close()
+    finally:
+        page.close()
+
+
+@contextmanager
+def asked_to_leave() -> Iterator[Callable[[], bool]]:
+    """Tells whether Ctrl-C has come; a second one meanwhile ends the program as ever."""
+    asked = threading.Event()
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in signals]
+
+    def put_back() -> None:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+
+    def ask(*_: object) -> None:
+        asked.set()
+        put_back()
+
+    for number in signals:
+        signal.signal(number, ask)
+    try:
+        yield asked.is_set
+    finally:
+        put_back()
+
+
+def announce(screen: Console, host: str, address: str) -> None:
+    """Say where the page is, and who can open it.
+
+    Args:
+        screen: Where to.
+        host: Served at.
+        address: To open.
+    """
+    from qpsafe.sim.web.server import LOCAL
+
+    if host not in LOCAL:
+        screen.print(LOCAL_WARNING.format(host=host), style="bold yellow")
+    screen.print(f"open {address} in a browser; Ctrl-C ends it", soft_wrap=True)

@@ -1,0 +1,34 @@
+"""The laws by the names that command line and page have for them."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.laws.hierarchical import HierarchicalLaw
+from qpsafe.laws.nullspace import NullspaceLaw
+from qpsafe.laws.problem import Law
+from qpsafe.laws.weighted import WeightedLaw
+
+LAWS = ("hierarchical", "nullspace", "weighted")
+PROJECTIONS = ("strict", "paper")
+
+
+def law_named(name: str, projection: str = "strict", solver: str | None = None) -> Law:
+    """A law.
+
+    Args:
+        name: One of `LAWS`.
+        projection: Of the hierarchical law, one of `PROJECTIONS`; the others take no notice.
+        solver: Of the QPs; the law's default if None.
+
+    Raises:
+        ConfigurationError: There is none of this name.
+    """
+    if name == "hierarchical":
+        return HierarchicalLaw(cast("Any", projection), solver=solver)  # which checks it
+    if name == "nullspace":
+        return NullspaceLaw()
+    if name == "weighted":
+        return WeightedLaw(solver=solver)
+    raise ConfigurationError("law_named", "name", name, "one of " + ", ".join(LAWS))

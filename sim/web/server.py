@@ -1,0 +1,188 @@
+"""The web server of a page: viser, bound to one address, closed to strangers, and honest about a port that is taken."""
+
+from __future__ import annotations
+
+import hmac
+import logging
+import secrets
+import socket
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from io import StringIO
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from qpsafe.errors import ConfigurationError, MissingExtraError
+
+HOST, PORT = "127.0.0.1", 8080
+COOKIE = "qpsafe_token"
+LOCAL = ("127.0.0.1", "localhost", "::1")
+NO_VISER = "a page in the browser needs viser: pip install 'qpsafe[web]'"
+
+
+def need_viser() -> Any:
+    """Viser's module.
+
+    Raises:
+        MissingExtraError: It is not installed, or too old.
+    """
+    try:
+        import viser
+        import viser.infra._infra
+    except ImportError as error:
+        raise MissingExtraError(f"{NO_VISER} ({error})") from error
+    if not hasattr(viser.GuiApi, "add_uplot") or not hasattr(viser.GuiApi, "add_panel"):
+        raise MissingExtraError(f"{NO_VISER} (found viser {viser.__version__}, 1.1 or newer is needed)")
+    return viser
+
+
+def check_port(host: str, port: int) -> None:
+    """See that a page can be served there.
+
+    Args:
+        host: Address of this computer.
+        port: 0 for any free one.
+
+    Raises:
+        ConfigurationError: The port is taken, or the host is none of this computer.
+    """
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: old ones may linger
+            probe.bind((host, port))
+    except OSError as error:
+        expected = f"an address of this computer and a free port: --port 0 takes any ({error})"
+        raise ConfigurationError("page", "host:port", f"{host}:{port}", expected) from None
+
+
+def address_of(host: str, port: int, token: str = "") -> str:
+    """What to open in a browser.
+
+    Args:
+        host: Served at.
+        port: Likewise.
+        token: That the page asks for.
+    """
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+
+
+def token_for(host: str, token: str | None) -> str:
+    """The token that a page asks for: none on this computer alone, else the given one, or a new one."""
+    return token or ("" if host in LOCAL else secrets.token_urlsafe(16))
+
+
+class Page:
+    """A running server.
+
+    Args:
+        host: Address to listen at.
+        port: Port; 0 for any free one.
+        title: Of the panel.
+        token: Whoever opens the page must know it; empty for nobody must.
+
+    Attributes:
+        server: Viser's.
+        address: To open in a browser, with the token.
+
+    Raises:
+        ConfigurationError: The port is taken.
+        MissingExtraError: Viser is not installed.
+    """
+
+    def __init__(self, host: str, port: int, title: str, token: str = "") -> None:
+        viser = need_viser()
+        check_port(host, port)
+        logging.getLogger("websockets").setLevel(logging.CRITICAL)  # whoever knocks and goes away is no news
+        with guarded(token), redirect_stdout(StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        self._forbid_tunnels(viser)
+        found = self.server.get_port()
+        if port not in (0, found):  # somebody was quicker; viser then takes the next one
+            self.close()
+            raise ConfigurationError("page", "host:port", f"{host}:{port}", "a free port: --port 0 takes any")
+        self.address = address_of(host, found, token)
+
+    def _forbid_tunnels(self, viser: Any) -> None:
+        """A browser could ask viser to show the page to the whole world."""
+        from viser import _messages
+
+        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
+            self.server._websock_server.unregister_handler(message)
+        self.server.gui.configure_theme(show_share_button=False, show_logo=False)
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody has the page open."""
+        return bool(self.server.get_clients())
+
+    def close(self) -> None:
+        """Stop serving; threads of its own end with the program."""
+        quiet = redirect_stdout(StringIO())
+        with quiet:
+            self.server.stop()
+
+
+@contextmanager
+def guarded(token: str) -> Iterator[None]:
+    """Servers that are opened meanwhile answer only who comes from their own page, and knows the token.
+
+    Viser has no hook for this: what it opens its server by is replaced as long as that takes.
+    """
+    from viser.infra import _infra
+
+    module: Any = _infra.websockets.asyncio.server
+    opened = module.serve
+
+    def serve(*given: Any, process_request: Callable[..., Any] | None = None, **options: Any) -> Any:
+        return opened(*given, process_request=_gatekeeper(token, process_request), **options)
+
+    with _ONE_AT_A_TIME:
+        module.serve = serve
+        try:
+            yield
+        finally:
+            module.serve = opened
+
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _gatekeeper(token: str, inner: Callable[..., Any] | None) -> Callable[..., Any]:
+    """What looks at every request before viser does."""
+
+    def look(connection: Any, request: Any) -> Any:
+        origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return connection.respond(HTTPStatus.FORBIDDEN, "another site's page has no access\n")
+        if not token:
+            if urlsplit(f"//{host}").hostname not in LOCAL:  # a name of somebody else's that leads here
+                return connection.respond(HTTPStatus.FORBIDDEN, "this page is for this computer only\n")
+            return None if inner is None else inner(connection, request)
+        given = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        if not (_same(given, token) or _same(_cookie(request), token)):
+            return connection.respond(HTTPStatus.FORBIDDEN, "the address needs the token that was printed with it\n")
+        response = None if inner is None else inner(connection, request)
+        if response is not None and given:
+            response.headers["Set-Cookie"] = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+        return response
+
+    return look
+
+
+def _same(one: str, other: str) -> bool:
+    return hmac.compare_digest(one.encode(), other.encode())
+
+
+def _cookie(request: Any) -> str:
+    try:
+        found = SimpleCookie(request.headers.get("Cookie", ""))
+    except CookieError:
+        return ""
+    return found[COOKIE].value if COOKIE in found else ""
