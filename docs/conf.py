@@ -38,6 +38,7 @@ napoleon_use_ivar = True
 napoleon_attr_annotations = False
 napoleon_use_rtype = False
 python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 90
 nitpicky = True
 nitpick_ignore_regex = [("py:(?!obj).*", ".*")]  # types in signatures: whatever NumPy and others call theirs
 

@@ -73,7 +73,7 @@ class SafetyController(Running):
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
         barrier: A cap on the danger field, beyond the paper; none by default.
-        gate: Figures of the last step, which lets through what of a command is verified: the default ones for None;
+        gate: Figures of the last step, which lets through the verified part of a command: the default ones for None;
             "off" sends it as it is. Without limits it is off.
         clearance: How near the robot may come to known obstacles, to itself and to what it carries; "off" switches it
             off, and so does `limits="off"`.

@@ -1,6 +1,6 @@
 """Named errors for mistakes in a user's configuration.
 
-Data in the control loop never raises: it is reported in the [`Tick`][qpsafe.tick.Tick]. What a person wrote wrongly
+Data in the control loop never raises: it is reported in the `Tick`. What a person wrote wrongly
 (a robot file, a constructor argument, a command-line value) raises one of these at once, and says which value, where,
 and what was expected.
 """
@@ -42,7 +42,7 @@ def _name_of(value: object) -> str:
 
 
 class ConfigurationError(QpsafeError, ValueError):
-    """A value that a person configured is wrong.
+    """A value in the configuration is wrong.
 
     Attributes:
         where: File or object that holds the value, e.g. ``"robots/irb140/robot.toml"``.

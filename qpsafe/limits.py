@@ -34,7 +34,7 @@ class Box(NamedTuple):
         upper: (n,) [rad/s], >= lower.
         lower_kind: Which limit made `lower`, (n,) codes into `KINDS`.
         upper_kind: Which limit made `upper`, (n,) codes into `KINDS`.
-        sacrificed: Which limit had to give way for the others, (n,) codes into `KINDS`, 0 for none. Jerk, where it is
+        sacrificed: Which limit had to give way to the others, (n,) codes into `KINDS`, 0 for none. Jerk, where it is
             limited, gives way first, then position, then velocity; acceleration always holds. The gravest is named.
     """
 
@@ -136,7 +136,7 @@ class JointLimits(Fixed):
         return cls(robot.lower, robot.upper, robot.max_velocity, robot.max_acceleration, dt)
 
     def plain(self) -> JointLimits:
-        """Limits of the same numbers, of no other making."""
+        """The same numbers as plain `JointLimits`."""
         return self if type(self) is JointLimits else JointLimits.gentler(self, 1.0)
 
     def gentler(self, share: float) -> JointLimits:

@@ -29,7 +29,7 @@ class ServoGains(NamedTuple):
 class JointReference:
     """Joint references of one tick, arm side, SI. For the motor side, see `qpsafe.irc5.records.gears`.
 
-    Two are equal if all their numbers are, NaN included.
+    Two references are equal if all their numbers are, NaN included.
 
     Attributes:
         seq: Number of the tick, counting from 0.

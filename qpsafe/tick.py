@@ -34,8 +34,8 @@ def _no_vectors() -> NDArray[np.float64]:
 class Tick:
     """Result of `SafetyController.step`.
 
-    Two are equal if they say the same, NaN included, however long they took. It can be copied, pickled, and changed by
-    `dataclasses.replace`.
+    Two ticks are equal if they say the same, NaN included, however long they took. A tick can be copied, pickled, and
+    changed by `dataclasses.replace`.
 
     Attributes:
         reference: Joint references for the robot.
@@ -59,9 +59,9 @@ class Tick:
         unseen: Names of the spots that cannot be trusted now, sick or in another unit than metres: nobody knows what is
             in front of them.
         joint_names: (n,) names used in reports.
-        task_names: Likewise, one a task.
+        task_names: Likewise, one per task.
         gate: What the last step, verified motion, let through of the command, and what was in its way.
-        resolved: What tasks, limits and law came to; None if they were not asked.
+        resolved: Results of tasks, limits and law; None if they were not asked.
         off_path: The `errors` where the references of this tick were not the tasks' own trajectories.
     """
 

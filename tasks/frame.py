@@ -23,7 +23,7 @@ ALL = (0, 1, 2, 3, 4, 5)
 class FrameTask(PoseTask):
     """Keep the pose of a frame, or some rows of it, on a trajectory: the paper picks rows of J_ee in the same way.
 
-    e = (x_d - x, log(R_d Rᵀ)) in world axes [m, rad]. A single angular row says what it seems to say only while the
+    e = (x_d - x, log(R_d Rᵀ)) in world axes [m, rad]. A single angular row means what it seems to mean only while the
     other angles are small.
 
     Args:
@@ -33,7 +33,7 @@ class FrameTask(PoseTask):
         rows: Which of x, y, z, then the rotation about x, y, z, in increasing order, from 0.
 
     Raises:
-        ConfigurationError: Rows that are none, or a bad gain.
+        ConfigurationError: Invalid rows, or a bad gain.
     """
 
     name = "frame"

@@ -29,7 +29,7 @@ class JointTask(Task):
         joints: Which joints, from 0; None for all.
 
     Raises:
-        ConfigurationError: Joints that are none, or a bad gain.
+        ConfigurationError: Invalid joints, or a bad gain.
     """
 
     fixed = Task.fixed | {"joints"}

@@ -24,16 +24,16 @@ class Event(NamedTuple):
 
 
 class Program(Fixed):
-    """Moves in a row. It keeps no clock: the same time gives the same reference, so it can be paused anywhere.
+    """A sequence of moves. It keeps no clock: the same time gives the same reference, so it can be paused anywhere.
 
     Args:
         moves: At least one; each begins where the one before it ends.
         events: Pairs of the number of the move before which it happens, and its name.
-        cycle: Whether to begin again at the end, for ever.
-        frame: Of the robot, that is to follow it; empty where the program does not say.
+        cycle: Whether to begin again at the end, forever.
+        frame: Frame of the robot that follows it; empty where the program does not say.
 
     Raises:
-        ConfigurationError: No moves, a gap between two of them, an event that belongs nowhere, a cycle not closed.
+        ConfigurationError: No moves, a gap between two of them, an event at no move, a cycle that is not closed.
     """
 
     fixed = frozenset(("moves", "cycle", "frame", "duration", "events"))

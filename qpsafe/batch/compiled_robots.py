@@ -93,7 +93,7 @@ class CompiledRobots:
         marks = integers[:, at.marks]
         happened = integers[:, at.happened[:, 1].ravel()]
         odd = np.flatnonzero(marks[:, code.STATUS])
-        kept = floats[odd], integers[odd], spots[odd]  # as they are now, for who asks later
+        kept = floats[odd], integers[odd], spots[odd]  # as they are now, for later questions
         names = () if self._controller.spots is None else self._controller.spots.names
 
         def words(robot: int) -> tuple[str, ...]:

@@ -22,22 +22,22 @@ from qpsafe.text.words import call
 
 
 class BatchController:
-    """n independent robots with the parts of one controller; what one does, or is told, never touches another.
+    """n independent robots with the parts of one controller; what one does, or is told, never affects another.
 
     Each robot's whole tick is compiled if the parts are plain: tasks on rows of a frame's pose, the strict hierarchical
-    law with the own solver, the built-in field, evasion, limits, activation and recovery rules, no barrier. The
+    law with the built-in solver, the built-in field, evasion, limits, activation and recovery rules, no barrier. The
     references are then those of as many `SafetyController`s: the same bits where trajectories are `FixedPose`s, else
     from knots that were checked against the trajectory (1e-10 m or rad). Other parts work the general way, by copies of
     the controller, more slowly; `why` says which part it is.
 
     Args:
-        controller: Its parts are taken, as they are now, and its state is not: all robots start anew.
+        controller: Its parts are used as they are now, its state is not: all robots start afresh.
         n: How many robots.
-        threads: How many threads share them; by default one a core. Results do not depend on it.
-        horizon: How far a trajectory is looked at that tells no end; farther when a clock comes there [s].
+        threads: How many threads share them; by default one per core. Results do not depend on it.
+        horizon: How far ahead a trajectory without an end is sampled; farther when a clock gets there [s].
 
     Raises:
-        ConfigurationError: An argument is none of these.
+        ConfigurationError: An argument is not one of these.
     """
 
     def __init__(

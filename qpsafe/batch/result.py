@@ -26,7 +26,7 @@ class Names:
 
 @dataclass(slots=True, eq=False, repr=False)
 class BatchTick(Names):
-    """Result of `BatchController.step`, a row a robot; its arrays are the caller's own.
+    """Result of `BatchController.step`, one row per robot; its arrays are the caller's own.
 
     Attributes:
         q: Position references (n, joints) [rad].
@@ -41,7 +41,7 @@ class BatchTick(Names):
         phase: Numbers into `BatchTick.PHASES` (n,).
         status: Numbers into `BatchTick.STATUSES` (n,).
         path_time: Clocks of the tasks' trajectories (n,) [s].
-        waits_for: The tasks that each path waits for, a bit a task, the first one's is 1 (n,).
+        waits_for: The tasks that each path waits for, one bit per task, the first task's is 1 (n,).
         errors: Errors of the commanded pose against the tasks' own trajectories, all rows in the tasks' order, NaN
             where a robot brakes (n, rows) [m or rad].
         events: Names of the events that robots reached at this tick, by the robot's number.

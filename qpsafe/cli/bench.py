@@ -25,9 +25,7 @@ def bench(
         Path | None, typer.Option(help="Also write the results to this JSON file.", callback=output_file(".json"))
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the results as JSON to standard output.")] = False,
-    compile: Annotated[
-        bool, typer.Option("--compile", help="Time the compilation instead, from an empty cache.")
-    ] = False,
+    compile: Annotated[bool, typer.Option("--compile", help="Time compilation instead, from an empty cache.")] = False,
 ) -> None:
     """Time the danger field and the whole controller tick; compilation excluded, machine named."""
     screen = console(json)

@@ -24,18 +24,18 @@ def calibrate(
         typer.Argument(help="CSV with the columns spot, distance [m, cm or mm], voltage [V or mV]."),
     ],
     robot: Annotated[
-        str | None, typer.Option(help="Robot folder to write calibration.toml into; its spots must all be in the file.")
+        str | None, typer.Option(help="Robot folder to write calibration.toml to; the file must cover all its spots.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the curves to this file instead.", callback=output_file())
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(help="Also draw curves and residuals into this PNG file.", callback=output_file(*DRAWN)),
+        typer.Option(help="Also draw curves and residuals to this PNG file.", callback=output_file(*DRAWN)),
     ] = None,
-    tolerance: Annotated[float, typer.Option(min=0.0, help="95 % of the pairs must fit within this [m].")] = 0.01,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Tolerance that 95 % of the pairs must meet [m].")] = 0.01,
     any_sensor: Annotated[
-        bool, typer.Option("--any-sensor", help="The voltages need not look like those of a Sharp GP2Y0A02YK.")
+        bool, typer.Option("--any-sensor", help="Accept voltages unlike those of a Sharp GP2Y0A02YK.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:

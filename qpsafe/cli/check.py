@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def check(
-    program: Annotated[Path, typer.Argument(help="TOML file of what the tool does.")],
+    program: Annotated[Path, typer.Argument(help="TOML file of the program that the tool follows.")],
     robot: RobotName = "irb140",
-    cell: Annotated[Path | None, typer.Option(help="TOML file of what stands in the cell by plan.")] = None,
+    cell: Annotated[Path | None, typer.Option(help="TOML file of the furniture in the cell.")] = None,
     clearance: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="How far away what stands there is to be at least [m].")
+        float, typer.Option(min=0.0, max=1.0, help="Smallest distance to furniture that is accepted [m].")
     ] = 0.004,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for a picture over time and the report.", callback=output_folder)
+        Path | None, typer.Option(help="Folder for the report and a plot over time.", callback=output_folder)
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:

@@ -28,8 +28,8 @@ def compare(
     states: Annotated[
         int | None, typer.Option(min=18, help="Number of random states.", show_default=f"{SAMPLE[0]:,}")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
-    tolerance: Annotated[float, typer.Option(min=0.0, help="Largest deviation accepted, in rad/s.")] = 1e-8,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Largest deviation that is accepted [rad/s].")] = 1e-8,
     closed_loop: Annotated[bool, typer.Option(help="Also compare whole runs of the first experiment.")] = True,
     duration: Annotated[
         float | None,

@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 
 
 def irc5_faults(
-    moments: Annotated[int, typer.Option(min=1, max=500, help="Random moments of a moving robot.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of the moments and of the wire.")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    moments: Annotated[int, typer.Option(min=1, max=500, help="Number of random moments while the robot moves.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the moments and of the wire.")] = 0,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+    ] = os.cpu_count() or 1,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Inject loss, delay, restarts, motors off, strangers, junk ... in simulated time; print the matrix of reactions.

@@ -25,43 +25,62 @@ if TYPE_CHECKING:
 
 
 def irc5_sim(
-    experiment: Annotated[Experiment, typer.Option(help="What is played around the robot.")] = Experiment.fixed,
+    experiment: Annotated[
+        Experiment, typer.Option(help="Experiment that is played around the robot.")
+    ] = Experiment.fixed,
     robot: RobotName = "irb140",
-    host: Annotated[str, typer.Option(help="Where qpsafe stream listens.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option(help="Address at which qpsafe stream listens.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=1, max=65535, help="Its port.")] = 6510,
-    sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Where distances go; 0: nowhere.")] = 6511,
-    event_port: Annotated[int, typer.Option(min=0, max=65535, help="Where names of events arrive; 0: any.")] = 6512,
+    sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Port to send distances to; 0: none.")] = 6511,
+    event_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port at which names of events arrive; 0: any free one.")
+    ] = 6512,
     sensor: Annotated[SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")] = (
         SensorName.ideal
     ),
     duration: Annotated[
-        float | None, typer.Option(min=0.1, help="From the first answer; the experiment's own [s].")
+        float | None,
+        typer.Option(min=0.1, help="Length of the run, from the first answer [s]; by default the experiment's."),
     ] = (None),
-    seed: Annotated[int, typer.Option(min=0, help="Varies people and faults; 0 is nominal.")] = 0,
-    lockstep: Annotated[bool, typer.Option("--lock-step", help="Wait for every answer: same run every time.")] = False,
-    gain: Annotated[float, typer.Option(min=0.0, max=20.0, help="k of the motion law [1/s].")] = 5.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of people and faults; 0 is nominal.")] = 0,
+    lockstep: Annotated[
+        bool, typer.Option("--lock-step", help="Wait for every answer, so that every run is the same.")
+    ] = False,
+    gain: Annotated[float, typer.Option(min=0.0, max=20.0, help="Gain k of the motion law [1/s].")] = 5.0,
     lowpass: Annotated[float, typer.Option(min=0.0, max=100.0, help="LpFilter [Hz]; 0: none.")] = 20.0,
     max_speed_deviation: Annotated[float, typer.Option(min=0.1, help="MaxSpeedDeviation [deg/s].")] = 450.0,
     comm_timeout: Annotated[float, typer.Option(min=0.004, help="CommTimeout [s].")] = 1.0,
-    cond_time: Annotated[float, typer.Option(min=0.004, help="CondTime [s]; by default never over.")] = math.inf,
+    cond_time: Annotated[float, typer.Option(min=0.004, help="CondTime [s]; by default infinite.")] = math.inf,
     robot_ramp_in: Annotated[float, typer.Option(min=0.0, help="RampInTime [s].")] = 0.05,
-    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Control lag [s].")] = 0.012,
-    retry: Annotated[float, typer.Option(min=0.0, help="RAPID starts EGM anew this long after a time-out [s].")] = 1.0,
+    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Servo lag [s].")] = 0.012,
+    retry: Annotated[
+        float, typer.Option(min=0.0, help="Time after which RAPID restarts EGM when it has timed out [s].")
+    ] = 1.0,
     loss: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of datagrams lost, each way.")] = 0.0,
-    delay: Annotated[float, typer.Option(min=0.0, max=10.0, help="Delay, each way, in whole cycles [s].")] = 0.0,
-    reorder: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that comes after the next.")] = 0.0,
-    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that comes twice.")] = 0.0,
-    garbage: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share followed by junk.")] = 0.0,
-    wrong_sender: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of cycles with a stranger.")] = 0.0,
-    faulty: Annotated[str, typer.Option(metavar="START:LENGTH", help="When the wire is bad [s].")] = "0:inf",
-    restart: Annotated[list[float] | None, typer.Option(help="RAPID starts anew at this time [s]; repeat it.")] = None,
-    motors_off: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="Motors off [s].")] = None,
-    rapid_stop: Annotated[list[str] | None, typer.Option(metavar="START:LENGTH", help="RAPID stopped [s].")] = None,
-    real_time: Annotated[bool, typer.Option("--real-time", help="Ask for SCHED_FIFO, for cycles on time.")] = False,
+    delay: Annotated[float, typer.Option(min=0.0, max=10.0, help="Delay each way, rounded to whole cycles [s].")] = 0.0,
+    reorder: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of datagrams that arrive after the next one.")
+    ] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of datagrams that arrive twice.")] = 0.0,
+    garbage: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of datagrams followed by garbage.")] = 0.0,
+    wrong_sender: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of cycles with a datagram from another sender.")
+    ] = 0.0,
+    faulty: Annotated[str, typer.Option(metavar="START:LENGTH", help="Period in which the wire is bad [s].")] = "0:inf",
+    restart: Annotated[
+        list[float] | None, typer.Option(help="Time at which RAPID restarts [s]; may be repeated.")
+    ] = None,
+    motors_off: Annotated[
+        list[str] | None, typer.Option(metavar="START:LENGTH", help="Period with motors off [s].")
+    ] = None,
+    rapid_stop: Annotated[
+        list[str] | None, typer.Option(metavar="START:LENGTH", help="Period with RAPID stopped [s].")
+    ] = None,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Request SCHED_FIFO, to keep cycles on time.")] = False,
     log: Annotated[
         Path | None, typer.Option(help="CSV of measured and referenced joint positions.", callback=output_file())
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Write what was seen as JSON to standard output.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Simulate an IRC5 under EGM that drives the MuJoCo plant, for qpsafe stream in another process.
 

@@ -31,30 +31,34 @@ def place(
     context: typer.Context,
     robot: Annotated[str, typer.Argument(help="A bundled robot, or the path of a robot folder.")] = "irb140",
     spots: Annotated[
-        int | None, typer.Option(help="How many there are; 20 if not given, or as many as the regions take.")
+        int | None, typer.Option(help="Number of spots; by default 20, or as many as the regions hold.")
     ] = None,
     probability: Annotated[
-        float | None, typer.Option(help="Instead: find the fewest that reach this detection probability, eq. (13).")
+        float | None,
+        typer.Option(help="Find the fewest spots that reach this detection probability instead, eq. (13)."),
     ] = None,
     objective: Annotated[
-        Objective, typer.Option(help="cost: (10)-(12). The others do not pay for redundant spots.")
+        Objective, typer.Option(help="cost is (10)-(12); the others give nothing for redundant spots.")
     ] = Objective.detection,
     caps: Annotated[
-        bool, typer.Option(help="Respect at_most of the regions (not for the curves, nor for (13)).")
+        bool, typer.Option(help="Respect at_most of the regions (not in the curves, nor for (13)).")
     ] = True,
-    nodes: Annotated[int, typer.Option(help="Wanted number of candidate nodes.")] = 254,
-    pairs: Annotated[int, typer.Option(help="Random pairs of robot and person, of each of the two samples.")] = 3000,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
+    nodes: Annotated[int, typer.Option(help="Number of candidate nodes to aim for.")] = 254,
+    pairs: Annotated[int, typer.Option(help="Random pairs of robot and person in each of the two samples.")] = 3000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
     radius: Annotated[
-        float | None, typer.Option(help="People stand this near to the base axis [m]; default: the robot's reach.")
+        float | None,
+        typer.Option(help="Largest distance of people from the base axis [m]; by default the robot's reach."),
     ] = None,
     pedestal: Annotated[float, typer.Option(help="Height of the robot's base above the floor [m].")] = 0.55,
-    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: as many as processors, 1: this one only.")] = 1,
-    time_limit: Annotated[float, typer.Option(min=0.0, help="For the 0-1 programme [s].")] = 30.0,
-    exact: Annotated[bool, typer.Option(help="Solve the 0-1 programme; else greedy and its bound only.")] = True,
-    pictures: Annotated[
-        bool, typer.Option(help="Draw the robot with nodes and spots, where OpenGL is to be had.")
+    workers: Annotated[
+        int, typer.Option(min=0, help="Number of processes; 0: one per processor, 1: this process only.")
+    ] = 1,
+    time_limit: Annotated[float, typer.Option(min=0.0, help="Time limit of the 0-1 program [s].")] = 30.0,
+    exact: Annotated[
+        bool, typer.Option(help="Solve the 0-1 program; otherwise the greedy choice and its bound only.")
     ] = True,
+    pictures: Annotated[bool, typer.Option(help="Draw the robot with nodes and spots; needs OpenGL.")] = True,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/place"),
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:

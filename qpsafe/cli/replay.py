@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="A run.npz that a demo wrote.")],
+    file: Annotated[Path, typer.Argument(help="A run.npz written by a demo.")],
     video: Annotated[
-        Path | None, typer.Option(help="Also film the recorded run into this mp4.", callback=output_file(".mp4"))
+        Path | None, typer.Option(help="Also film the recorded run to this mp4.", callback=output_file(".mp4"))
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Also show it in MuJoCo's viewer; needs a display.")] = False,
     web: Annotated[bool, typer.Option("--web", help="Then show it in the browser, with a time slider.")] = False,

@@ -113,7 +113,7 @@ def add(
         Path | None,
         typer.Option(help="Folder of the robot.toml; by default the model file's.", callback=output_folder),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a robot.toml that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing robot.toml.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")] = False,
 ) -> None:
     """Write a first robot.toml for a model file: limits, wire and frames as found, with notes on what was assumed."""

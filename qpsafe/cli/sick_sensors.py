@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 
 def sick_sensors(
-    moments: Annotated[int, typer.Option(min=1, max=200, help="Random moments of the first experiment.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of the moments and of the spots that fall sick.")] = 0,
-    sensor: Annotated[SensorName, typer.Option(help="What the healthy spots are.")] = SensorName.ideal,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    moments: Annotated[
+        int, typer.Option(min=1, max=200, help="Number of random moments in the first experiment.")
+    ] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the moments and of the spots that fall sick.")] = 0,
+    sensor: Annotated[SensorName, typer.Option(help="Sensor model of the healthy spots.")] = SensorName.ideal,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+    ] = os.cpu_count() or 1,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Inject NaN, spikes, stuck, stale, dead sensors in the first experiment and print the matrix of reactions.

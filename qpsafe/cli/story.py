@@ -12,10 +12,10 @@ from qpsafe.cli.outputs import DRAWN, output_file
 
 
 def story(
-    file: Annotated[Path, typer.Argument(help="TOML file of who does what.")],
+    file: Annotated[Path, typer.Argument(help="TOML file of a story.")],
     plot: Annotated[
         Path | None,
-        typer.Option(help="Draw ways and footprints from above into this PNG file.", callback=output_file(*DRAWN)),
+        typer.Option(help="Draw paths and footprints from above to this PNG file.", callback=output_file(*DRAWN)),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the times as JSON to standard output.")] = False,
 ) -> None:

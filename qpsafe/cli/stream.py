@@ -42,46 +42,56 @@ class Acknowledge(StrEnum):
 
 def stream(
     robot: RobotName = "irb140",
-    host: Annotated[str, typer.Option(help="Address or interface of this computer that the robot speaks to.")] = (
+    host: Annotated[str, typer.Option(help="Address or interface of this computer that the robot sends to.")] = (
         "127.0.0.1"
     ),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6510,
-    peer: Annotated[str | None, typer.Option(help="Address of the robot; by default the first that speaks.")] = None,
+    peer: Annotated[str | None, typer.Option(help="Address of the robot; by default the first sender.")] = None,
     program: Annotated[
-        Path | None, typer.Option(help="TOML file of what the tool does; by default it keeps the robot's home pose.")
+        Path | None, typer.Option(help="TOML file of the program; by default the tool keeps its home pose.")
     ] = None,
-    cell: Annotated[Path | None, typer.Option(help="TOML file of what stands in the cell by plan.")] = None,
+    cell: Annotated[Path | None, typer.Option(help="TOML file of the furniture in the cell.")] = None,
     unchecked: Annotated[
-        bool, typer.Option("--unchecked", help="Stream a program that `qpsafe check` finds wrong all the same.")
+        bool, typer.Option("--unchecked", help="Stream a program even if `qpsafe check` rejects it.")
     ] = False,
     experiment: Annotated[
-        Experiment | None, typer.Option(help="Task and cell of an experiment that irc5-sim plays.")
+        Experiment | None, typer.Option(help="Experiment that irc5-sim plays: its task and its cell.")
     ] = None,
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
-    projection: Annotated[ProjectionName, typer.Option(help="Of the hierarchical law.")] = ProjectionName.strict,
+    projection: Annotated[
+        ProjectionName, typer.Option(help="Projection of the hierarchical law.")
+    ] = ProjectionName.strict,
     sensor_host: Annotated[str, typer.Option(help="Address of this computer at which distances arrive.")] = "127.0.0.1",
     sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6511,
     sensors: Annotated[
-        bool, typer.Option("--sensors/--no-sensors", help="Without, the robot sees nobody: for tests only.")
+        bool,
+        typer.Option(
+            "--sensors/--no-sensors", help="Use distances; without them the robot sees nobody, for tests only."
+        ),
     ] = True,
     events: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="Where names of the program's events are sent; empty: nowhere.")
+        str, typer.Option(metavar="HOST:PORT", help="Address to send the names of events to; empty: none.")
     ] = "127.0.0.1:6512",
-    duration: Annotated[float | None, typer.Option(min=0.1, help="Leave after this time of streaming [s].")] = None,
+    duration: Annotated[float | None, typer.Option(min=0.1, help="Stop after streaming for this long [s].")] = None,
     patience: Annotated[
-        float, typer.Option(min=0.0, help="Leave when the robot has been silent for so long [s]; 0: never.")
+        float, typer.Option(min=0.0, help="Stop when the robot has been silent for this long [s]; 0: never.")
     ] = 15.0,
-    ramp_in: Annotated[float, typer.Option(min=0.01, max=10.0, help="Blending in from the measured pose [s].")] = 0.5,
-    ramp_out: Annotated[float, typer.Option(min=0.01, max=10.0, help="Shortest time of braking [s].")] = 0.2,
+    ramp_in: Annotated[
+        float, typer.Option(min=0.01, max=10.0, help="Time to blend in from the measured pose [s].")
+    ] = 0.5,
+    ramp_out: Annotated[float, typer.Option(min=0.01, max=10.0, help="Shortest braking time [s].")] = 0.2,
     acknowledge: Annotated[
-        Acknowledge, typer.Option(help="What lifts a stop that the robot made itself: its own start, or SIGUSR1 only.")
+        Acknowledge, typer.Option(help="What clears a stop of the robot's own: its restart, or SIGUSR1 only.")
     ] = Acknowledge.robot,
     real_time: Annotated[
-        bool, typer.Option("--real-time/--no-real-time", help="Ask for SCHED_FIFO and locked memory.")
+        bool, typer.Option("--real-time/--no-real-time", help="Request SCHED_FIFO and locked memory.")
     ] = False,
-    priority: Annotated[int, typer.Option(min=1, max=98, help="Of SCHED_FIFO.")] = 80,
+    priority: Annotated[int, typer.Option(min=1, max=98, help="Priority under SCHED_FIFO.")] = 80,
     watchdog: Annotated[
-        float, typer.Option(min=0.0, max=10.0, help="Heartbeat's age at which it asks for a stop [s]; 0: none.")
+        float,
+        typer.Option(
+            min=0.0, max=10.0, help="Age of the heartbeat at which the watchdog requests a stop [s]; 0: no watchdog."
+        ),
     ] = 0.1,
     log: Annotated[
         Path | None, typer.Option(help="Log of the references, .csv or .qpref.", callback=output_file(".csv", ".qpref"))

@@ -28,9 +28,11 @@ def web(
         str, typer.Option(help="A bundled robot, a robot folder, a URDF or an MJCF file, or PACKAGE:MODEL.")
     ] = "irb140",
     program: Annotated[
-        Path | None, typer.Option(help="TOML file of what the tool does; by default it keeps the robot's home pose.")
+        Path | None, typer.Option(help="TOML file of the program; by default the tool keeps its home pose.")
     ] = None,
-    story: Annotated[Path | None, typer.Option(help="TOML file of who comes besides who is dragged.")] = None,
+    story: Annotated[
+        Path | None, typer.Option(help="TOML file of a story: people who come besides the dragged one.")
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to serve at; any but this computer's own needs a token.")] = (
         "127.0.0.1"
     ),

@@ -167,7 +167,7 @@ class Activation(Fixed):
         """Switches, activations and the regime's name, in one pass.
 
         Raises:
-            ValueError: A derived class gives what are no activations.
+            ValueError: A derived class returned something that is not activations.
         """
         if type(self) is not Activation:
             found = tuple([float(a) for a in self.activations(cdf_n)])

@@ -137,7 +137,7 @@ class Evasion:
 
     @classmethod
     def for_robot(cls, robot: Robot, dt: float) -> Evasion:
-        """M and D from a robot's own limits and geometry; that of a controller which is given none.
+        """M and D from a robot's own limits and geometry; the default of a controller.
 
         Let ℓ_j be the longest lever of joint j, the largest |(J_(i-1) + J_i)_j| over links and configurations: a danger
         Δ at one point causes a torque of at most Δ ℓ_j there, see (14), (15). Then
@@ -152,7 +152,7 @@ class Evasion:
         time v_j/a_j that a joint needs to its largest speed: the filter smooths, the acceleration limits set the pace.
         M = 4, D = 20 of the first experiment are what s = 1/4, b = 0.6 give on the IRB 140; its own are 1 and 10.
 
-        Stability: moving away takes force away, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive: a point at rest is
+        Stability: moving away reduces the force, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive: a point at rest is
         evaded without a cycle whatever K is. A delay T takes phase from that: where the loop's gain K/(ω |M jω + D|) is
         1, it needs ω T + atan(ω M/D) < π/2. At the distance d a danger Δ falls as Δ/d, so K <= Δ Σ_j ℓ_j²/(2 d), with
         all joints at their longest levers. For the IRB 140 at 0.3 m K/D <= 11 rad/s, the gain is 1 at 8 rad/s, and

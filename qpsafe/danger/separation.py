@@ -28,7 +28,7 @@ class Separation:
     """Figures of speed and separation monitoring.
 
     Attributes:
-        deceleration: a_s, of a stop, the smallest that was measured [m/s²].
+        deceleration: a_s, the smallest deceleration of a stop that was measured [m/s²].
         person_speed: v_h, 1.6 for walking people, 2.0 for reaching hands (ISO 13855) [m/s].
         reaction_time: T_r, from what the sensor sees to the beginning of the stop [s].
         intrusion: C, how far a part of the body may be past what is detected [m]. ISO 13855 asks for 0.85 m where the
@@ -70,7 +70,7 @@ class Separation:
         Args:
             distance: To a person, any shape [m].
             held: For how long the speed is kept before another one can be commanded [s]: S_p(v_max) + v_max held = d,
-                so that it is admissible still where it leads to.
+                so that it is still admissible where it leads.
         """
         b = self.deceleration * (self.reaction_time + held) + self.person_speed
         room = np.asarray(distance, dtype=float) - self.standing

@@ -64,7 +64,7 @@ class SeparationLimit(Fixed):
         separation: The figures. Their deceleration is that of the robot, the smallest that was measured.
 
     Raises:
-        ConfigurationError: No figures.
+        ConfigurationError: `separation` is not a `Separation`.
     """
 
     fixed = frozenset(("separation",))

@@ -38,7 +38,7 @@ def robot_thresholds(robot: Robot) -> tuple[Threshold, Threshold]:
 
 
 def robot_activation(robot: Robot, high: int = 1, low: int = 1) -> Activation:
-    """The activation of a robot with several tasks at a level, e.g. one of each kind for each of its tools.
+    """The activation of a robot with several tasks at a level, such as one of each kind for each of its tools.
 
     Args:
         robot: The robot.

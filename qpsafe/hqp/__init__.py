@@ -1,1 +1,1 @@
-"""Hierarchical quadratic programmes: prioritised least squares under hard limits."""
+"""Hierarchical quadratic programs: prioritised least squares under hard limits."""

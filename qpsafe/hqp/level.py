@@ -14,7 +14,7 @@ from qpsafe.errors import ConfigurationError
 class Level:
     """Rows of one priority.
 
-    The level asks for `lower <= A q̇ <= upper`. Where that cannot be had, it minimises `Σ weight_i v_i²`, v_i being the
+    The level asks for `lower <= A q̇ <= upper`. Where that is impossible, it minimises `Σ weight_i v_i²`, v_i being the
     distance of row i to its interval. An equality is a row with `lower == upper`; infinite bounds are allowed.
 
     Shapes are checked here and raise; values are data of the loop and are checked, and reported, by the solver.

@@ -1,4 +1,4 @@
-"""The answer of [`solve_hierarchy`][qpsafe.hqp.solve.solve_hierarchy], which explains itself."""
+"""The answer of `solve_hierarchy`, which explains itself."""
 
 from __future__ import annotations
 

@@ -62,12 +62,12 @@ def solve_hierarchy(
         lower: (n,) hard lower limits [rad/s], may be infinite; None means none.
         upper: (n,) hard upper limits [rad/s], may be infinite; None means none.
         solver: "own" (the default), "daqp" (its hierarchical mode), "proxqp" (level by level in workspaces that are
-            kept and warm started) or "qpsolvers:<name>" (one program a level). The own solver judges these: where they
-            fail or a level comes out worse, its answer is returned, and `solver` and `note` of the solution say so.
+            kept and warm started) or "qpsolvers:<name>" (one program per level). The built-in solver judges these:
+            where they fail or a level comes out worse, its answer is returned, and `solver` and `note` say so.
         rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
         damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
             A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
-            nothing. One number, or one a level; 0 means none. Own solver only.
+            nothing. One number, or one per level; 0 means none. Own solver only.
 
     Returns:
         The solution. "solved" means optimal at every level to rounding, in any units of levels and hard rows; where

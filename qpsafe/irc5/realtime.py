@@ -43,7 +43,7 @@ def one_thread() -> Grant:
 def fifo(priority: int, thread: int = 0) -> Grant:
     """The real-time scheduler SCHED_FIFO, for a thread by its number; 0: for the one that asks."""
     if not hasattr(os, "sched_setscheduler"):
-        return Grant("fifo", False, f"SCHED_FIFO: not to be had on {sys.platform}; normal priority")
+        return Grant("fifo", False, f"SCHED_FIFO: not available on {sys.platform}; normal priority")
     try:
         os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, ValueError) as error:
@@ -59,7 +59,7 @@ def lock_memory() -> Grant:
         failed = libc.mlockall(_CURRENT | _FUTURE) != 0
         reason = os.strerror(ctypes.get_errno())
     except (OSError, AttributeError, TypeError):
-        failed, reason = True, f"not to be had on {sys.platform}"
+        failed, reason = True, f"not available on {sys.platform}"
     if failed:
         needs = "needs CAP_IPC_LOCK, or a line 'memlock' in /etc/security/limits.conf"
         return Grant("mlockall", False, f"mlockall: not permitted ({reason}); {needs}")

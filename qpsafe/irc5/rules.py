@@ -11,7 +11,7 @@ from qpsafe.errors import ConfigurationError
 
 @dataclass(frozen=True)
 class SessionRules:
-    """How an [`EgmSession`][qpsafe.irc5.session.EgmSession] drives a robot.
+    """How an `EgmSession` drives a robot.
 
     Attributes:
         ramp_in: How long references are blended in, from the measured pose on [s].

@@ -122,10 +122,10 @@ class Supervisor:
     Args:
         clock: Tells the time [s].
         keep: How many transitions `log` keeps; the oldest are dropped, `count` goes on.
-        on_transition: Called with every transition, e.g. to print it. What it raises is kept in `unheard`, no more.
+        on_transition: Called with every transition, e.g. to print it. What it raises is only kept in `unheard`.
 
     Attributes:
-        state: Now.
+        state: The present state.
         category: Of the present stop, None without one.
         causes: Why the state is degraded or worse; each once, until acknowledged.
         log: The last transitions.

@@ -52,7 +52,7 @@ class HierarchicalLaw(Fixed):
             only. By default 0.04 where the projection is strict and the solver the own one, else 0, off.
 
     Raises:
-        ConfigurationError: Unknown projection, or a damping that is no finite number >= 0.
+        ConfigurationError: Unknown projection, or a damping that is not a finite number >= 0.
     """
 
     fixed = frozenset(("projection", "solver", "damping", "damping_time"))

@@ -68,7 +68,7 @@ def nullspace_velocity(
 class NullspaceLaw(Fixed):
     """The law of the paper: (18) for one task, (22) for two, the same blend of pure regimes for more.
 
-    It takes no notice of limits; the controller clips what it returns.
+    It ignores limits; the controller clips what it returns.
     """
 
     def __init__(self) -> None:

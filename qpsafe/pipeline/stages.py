@@ -81,7 +81,7 @@ class Stages:
         """
         made = self._gate
         if made is None or not (made.rules is rules and made.limits is limits):
-            from qpsafe.gate.gate import Gate  # not compiled for who has none
+            from qpsafe.gate.gate import Gate  # not compiled where there is none
 
             made = self._gate = Gate(self._robot, rules, limits, *self._surroundings)
         return made

@@ -1,4 +1,4 @@
-"""The 0-1 programmes on HiGHS: least spots for a probability, eq. (13), and the best choice of a number of spots.
+"""The 0-1 programs on HiGHS: least spots for a probability, eq. (13), and the best choice of a number of spots.
 
 y_i = 1 for a chosen node. Only y must be whole: the best z is then 0 or 1 by itself, or can be made so.
 

@@ -119,7 +119,7 @@ def study(
         spots: How many there are.
         probability: Find the fewest spots that reach it instead, eq. (13).
         caps: How many spots of a kind there may be; ignored by the curves and by (13).
-        time_limit: For each 0-1 programme [s].
+        time_limit: For each 0-1 program [s].
         exact: False: greedy only.
         progress: Called with the name of what comes next.
 

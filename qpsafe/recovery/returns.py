@@ -25,7 +25,7 @@ class RecoveryRules:
         shortest: Least duration of a return [s], so that small ones stay gentle.
         fade: Time constant with which a task's motion runs out while it may not return or is faster than a return [s].
         acceleration: Share of the joints' acceleration limits that is used on the way back, in (0, 1]; more only
-            where a joint could not stop before its position limit else.
+            where a joint could not otherwise stop before its position limit.
         tolerance: Largest error norm at which a task counts as met [m or rad].
         ramp: Time in which the path's clock comes to full speed again, or to rest when it is paused [s].
         patience: Time [s] after which a robot that stands off its goals, or moves without getting nearer, though no

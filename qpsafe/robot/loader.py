@@ -42,7 +42,7 @@ def load_robot(
     """Load a robot. Where a joint slides, limits are in m instead of rad.
 
     Args:
-        name_or_path: A bundled name (see [`bundled_robots`][]); the path of a robot folder (with `robot.toml`); an MJCF
+        name_or_path: A bundled name (see `bundled_robots`); the path of a robot folder (with `robot.toml`); an MJCF
             or URDF file, from which limits, frames and a wire along the joint tree are taken; or a model of another
             package, ``"robot_descriptions:panda_description"`` or ``"example_robot_data:ur5"``.
         toml: A `robot.toml` that describes this model file, wherever it is.

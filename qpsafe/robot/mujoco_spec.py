@@ -102,7 +102,7 @@ def _add_rods(robot: Robot, bodies: list[Any]) -> set[int]:
 
 
 def _add_inertia(robot: Robot, bodies: list[Any], inertias: list[Any], shaped: set[int]) -> list[str]:
-    """Mass and inertia as stated; those of water in its shape, or a hundred grams, where there is none to be had."""
+    """Mass and inertia as stated; else those of water in its shape, or a hundred grams if it has none."""
     import mujoco
 
     made_up = []

@@ -29,12 +29,12 @@ class Robot(Fixed):
 
     A joint that slides has metres where one that turns has radians.
 
-    Make one with [`load_robot`][qpsafe.robot.loader.load_robot]. In a loop, call [`at`][] once a tick
+    Make one with `load_robot`. In a loop, call `at` once a tick
     and ask the state.
 
     Attributes:
         name: Short name.
-        title: Name for people.
+        title: Name to show.
         folder: Folder of its files.
         model_path: Its MJCF or URDF file.
         nq: Number of joints, n.
@@ -43,7 +43,7 @@ class Robot(Fixed):
         upper: Upper position limits, (n,) [rad].
         max_velocity: Speed limits, (n,) [rad/s].
         max_acceleration: Acceleration limits, (n,) [rad/s^2].
-        home: A pose to start from, (n,) [rad].
+        home: Pose to start from, (n,) [rad].
         sliding: Which joints slide, (n,).
         endless: Which joints turn without end; joint tasks take the short way there, (n,).
         frame_names: Names that `pose` and `jacobian` accept.
@@ -53,14 +53,14 @@ class Robot(Fixed):
         ends: How many these are, k.
         tree: The joints as compiled code sees them, taken from the model.
         memory: Floats in the kinematics of one configuration.
-        tools: The mounted tools, one an arm.
+        tools: The mounted tools, one per arm.
         tool: The first of them, or None.
         tool_frames: Frames at the tips of the tools; the ends of the wire where no tool is named.
-        chains: Published Denavit-Hartenberg tables, one an arm.
+        chains: Published Denavit-Hartenberg tables, one per arm.
         dh: The table (theta, d, a, alpha) of a robot with one, (n, 4), or None.
         dh_frames: Names of the frames of that table.
         danger: (Δ, ε) and (Δ_f, ε_f) as the robot's file states them, or None.
-        notes: What is missing or doubtful in the robot's files, in words; empty if nothing is.
+        notes: What is missing or doubtful in the robot's files, in words; empty if all is well.
         spots_path: File of the distance sensors, or None where there is none.
         regions: Parts of the surface that may carry distance sensors.
         hulls: Reads the hulls of the collision geometry; use `qpsafe.sensing.body`, which keeps them.
@@ -206,10 +206,10 @@ class Robot(Fixed):
             raise self._no_frame(frame) from None
 
     def joint_vector(self, values: ArrayLike, key: str) -> NDArray[np.float64]:
-        """A float64 array of one value a joint, (n,).
+        """A float64 array of one value per joint, (n,).
 
         Raises:
-            ConfigurationError: The shape is another one, or these are no numbers.
+            ConfigurationError: Wrong shape, or not numbers.
         """
         if type(values) is np.ndarray and values.dtype == _FLOAT and values.shape == (self.nq,):  # the usual case
             return values

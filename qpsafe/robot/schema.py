@@ -1,7 +1,7 @@
 """What a `robot.toml` may say, and how what it says becomes SI units.
 
-The file is checked in two steps: the shape and type of every value (pydantic, [`RobotFile`][]), then what the values
-say about each other ([`check`][]). Whatever is wrong becomes a [`RobotFileError`][qpsafe.errors.RobotFileError] that
+The file is checked in two steps: the shape and type of every value (pydantic, `RobotFile`), then what the values
+say about each other (`check`). Whatever is wrong becomes a `RobotFileError` that
 names the file, the key and the value.
 """
 

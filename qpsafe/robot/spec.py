@@ -1,4 +1,4 @@
-"""Everything a robot's folder says, in SI units: the one thing a [`Robot`][qpsafe.robot.robot.Robot] is built from."""
+"""Everything a robot's folder says, in SI units: the one thing a `Robot` is built from."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class RobotSpec:
 
     Attributes:
         name: Short name, as given to `load_robot`.
-        title: Name for people.
+        title: Name to show.
         folder: Folder of the model file.
         model_path: MJCF or URDF file, robot only.
         joint_names: One a joint, base to tip.
@@ -84,7 +84,7 @@ class RobotSpec:
         upper: Upper position limits, (n,) [rad].
         max_velocity: Speed limits, (n,) [rad/s].
         max_acceleration: Acceleration limits, (n,) [rad/s^2].
-        home: A pose to start from, (n,) [rad].
+        home: Pose to start from, (n,) [rad].
         frames: Frame name -> name of a site, body or link of the model.
         wire_frames: Start and end frame of each segment of the wire model.
         tools: The mounted tools, one an arm; none where the file names none.

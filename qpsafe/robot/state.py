@@ -35,7 +35,7 @@ class Jointed(Protocol):
 
 
 class RobotState:
-    """Kinematics of a robot at one configuration; made by [`Robot.at`][qpsafe.robot.robot.Robot.at].
+    """Kinematics of a robot at one configuration; made by `Robot.at`.
 
     Several states may be alive at the same time (measured and commanded pose): each owns its memory. Every array
     returned is the caller's own, or read-only.

@@ -10,7 +10,7 @@ from qpsafe.errors import ConfigurationError
 
 @dataclass(frozen=True)
 class SensingRules:
-    """What counts as danger, and what a sick sensor does; docs/reference/sensing.md has the table.
+    """What counts as danger, and what happens when a sensor is sick; docs/reference/sensing.md has the table.
 
     Attributes:
         d_min: A measurement below this always counts, known obstacle or not [m]. Above 0.15 m, where the Sharp sensor

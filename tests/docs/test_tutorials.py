@@ -47,10 +47,19 @@ def matches(expected: str, printed: str) -> bool:
     )
 
 
-def run(command: str, folder: Path) -> str:
-    """What a command line prints to standard output; it has to end well."""
+def run(command: str, folder: Path, started: list[subprocess.Popen[bytes]]) -> str:
+    """What a command line prints to standard output; it has to end well.
+
+    Args:
+        command: The line.
+        folder: Where it runs.
+        started: What runs beside, by `&`; added to.
+    """
     words = shlex.split(command, comments=True)
     program = {"python": [sys.executable], "qpsafe": [sys.executable, "-c", QPSAFE]}[words[0]]
+    if words[-1] == "&":
+        started.append(subprocess.Popen([*program, *words[1:-1]], cwd=folder, stdout=subprocess.DEVNULL))
+        return ""
     done = subprocess.run(
         [*program, *words[1:]],
         cwd=folder,
@@ -67,18 +76,21 @@ def run(command: str, folder: Path) -> str:
 def test_the_tutorial_runs_in_an_empty_folder(page: Path, tmp_path: Path) -> None:
     """A block that begins with `# save as NAME` is a file; text that follows a command is what it prints."""
     printed, ran = "", 0
+    started: list[subprocess.Popen[bytes]] = []
     for block in blocks(page):
         where = f"{page.name}:{block.line}"
         if saved := re.match(r"(?:#|<!--) save as (\S+)", block.text):
+            (tmp_path / saved[1]).parent.mkdir(exist_ok=True)
             (tmp_path / saved[1]).write_text(block.text, encoding="utf-8")
         elif block.language == "bash":
             printed = ""
             for line in block.text.splitlines():
                 if line.strip() and not line.startswith((*SET_UP, "#")):
-                    printed += run(line, tmp_path)
+                    printed += run(line, tmp_path, started)
                     ran += 1
         elif block.language == "text":
             assert matches(block.text, printed), f"{where}: the page says\n{block.text}\nit prints\n{printed}"
         else:
             raise AssertionError(f"{where}: nothing is done with this block")
     assert ran
+    assert [process.wait(60.0) for process in started] == [0] * len(started)

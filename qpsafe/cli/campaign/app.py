@@ -16,7 +16,7 @@ class CampaignGroup(Group):
     default = "run"
 
 
-app = typer.Typer(cls=CampaignGroup, help="Meet people by the thousand, each time under every controller.")
+app = typer.Typer(cls=CampaignGroup, help="Judge controllers by thousands of encounters with people.")
 app.command("run")(run)
 app.command("show")(show)
 app.command("worst")(worst)

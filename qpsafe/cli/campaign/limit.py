@@ -35,14 +35,14 @@ WHERE = "qpsafe campaign limit"
 def limit(
     *,
     trial: Annotated[
-        str, typer.Argument(help="Its number; FILE.json#K: a case that `worst` has written; or a campaign's folder.")
+        str, typer.Argument(help="Trial number; FILE.json#K: case K written by `worst`; or a campaign's folder.")
     ],
     controller: Annotated[
-        str | None, typer.Option(help="Whose state it begins in; by default the one of a case, or `default`.")
+        str | None, typer.Option(help="Controller to begin from; by default that of the case, or `default`.")
     ] = None,
     plan: FileOption = None,
     typed: Typed,
-    evaluations: Annotated[int | None, typer.Option(min=100, help="Motions to try in a trial, by default 800.")] = None,
+    evaluations: Annotated[int | None, typer.Option(min=100, help="Motions to try per trial; 800 by default.")] = None,
     workers: Workers = WORKERS,
     dask: Dask = None,
     json: Json = False,

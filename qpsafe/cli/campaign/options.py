@@ -29,23 +29,21 @@ WORKERS = os.cpu_count() or 1
 
 File = Annotated[Path | None, typer.Argument(help="A plan, docs/reference/files.md; options override it.")]
 FileOption = Annotated[Path | None, typer.Option("--file", help="A plan, as the argument; options override it.")]
-Workers = Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")]
-Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler, which takes the place of --workers.")]
-Json = Annotated[bool, typer.Option("--json", help="Write what came of it as JSON to standard output.")]
+Workers = Annotated[int, typer.Option(min=1, help="Number of processes; by default one per processor.")]
+Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead of --workers.")]
+Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")]
 
 #: Options that make a plan, by its keys.
 PLAN = {
-    "seed": Annotated[int | None, typer.Option(help="Of the first trial; the others' follow one by one.")],
+    "seed": Annotated[int | None, typer.Option(help="Seed of the first trial; the others count up from it.")],
     "robot": Annotated[
         str | None, typer.Option(help="A bundled robot, or the path of a robot folder, MJCF or URDF file.")
     ],
-    "motions": Annotated[str | None, typer.Option(help="hold, line, pick or programs' files, separated by commas.")],
-    "sensor": Annotated[str | None, typer.Option(help="What they see by: ideal, sharp or perfect.")],
-    "lag": Annotated[
-        float | None, typer.Option(help="Of the servos, a multiple of 0.004 [s]; 0: they follow perfectly.")
-    ],
+    "motions": Annotated[str | None, typer.Option(help="hold, line, pick or program files, separated by commas.")],
+    "sensor": Annotated[str | None, typer.Option(help="Sensor model: ideal, sharp or perfect.")],
+    "lag": Annotated[float | None, typer.Option(help="Servo lag, a multiple of 0.004 [s]; 0: perfect following.")],
     "people": Annotated[
-        Path | None, typer.Option(help="A TOML file with a model of people or a story, or a folder of these.")
+        Path | None, typer.Option(help="TOML file with a model of people or a story, or a folder of these.")
     ],
 }
 #: What was typed of them, by the plan's keys; None for what was not.

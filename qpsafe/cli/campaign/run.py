@@ -37,15 +37,15 @@ def run(
     *,
     file: File = None,
     quick: Annotated[bool, typer.Option("--quick", help="12 trials, a minute; only --out keeps them.")] = False,
-    trials: Annotated[int | None, typer.Option(help="How many; 3,000 by default.")] = None,
-    controllers: Annotated[str | None, typer.Option(help="Names of whom to compare, separated by commas.")] = None,
+    trials: Annotated[int | None, typer.Option(help="Number of trials; 3,000 by default.")] = None,
+    controllers: Annotated[str | None, typer.Option(help="Controllers to compare, separated by commas.")] = None,
     typed: Typed,
     workers: Workers = WORKERS,
     dask: Dask = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for trials and report; by default one in out/ that is named after the plan.",
+            help="Folder for trials and report; by default a folder in out/ named after the plan.",
             callback=output_folder,
         ),
     ] = None,
@@ -81,7 +81,7 @@ def run(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="Of a campaign.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of a campaign.")],
     out: Annotated[
         Path | None, typer.Option(help="Folder for the report; by default the campaign's.", callback=output_folder)
     ] = None,

@@ -36,13 +36,13 @@ if TYPE_CHECKING:
 @planned
 def show(
     *,
-    trial: Annotated[str, typer.Argument(help="Its number, or FILE.json#K: case K that `worst` has written.")],
+    trial: Annotated[str, typer.Argument(help="Trial number, or FILE.json#K: case K written by `worst`.")],
     controller: Annotated[
-        str | None, typer.Option(help="Who is to be seen; by default the one of a case, or `default`.")
+        str | None, typer.Option(help="Controller to show; by default that of the case, or `default`.")
     ] = None,
     plan: FileOption = None,
     typed: Typed,
-    out: Annotated[Path, typer.Option(help="Folder for video and table.", callback=output_folder)] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for the video and the table.", callback=output_folder)] = Path(
         "out/campaign-show"
     ),
     json: Json = False,
@@ -90,8 +90,8 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
 @planned
 def worst(
     *,
-    controller: Annotated[str, typer.Argument(help="Whose worst case.")],
-    trials: Annotated[int, typer.Option(min=1, help="For the search, and as many again at random.")] = 2000,
+    controller: Annotated[str, typer.Argument(help="Controller whose worst case is wanted.")],
+    trials: Annotated[int, typer.Option(min=1, help="Trials for the search, and as many again at random.")] = 2000,
     plan: FileOption = None,
     typed: Typed,
     workers: Workers = WORKERS,

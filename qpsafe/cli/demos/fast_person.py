@@ -33,12 +33,14 @@ if TYPE_CHECKING:
 def fast_person(
     robot: RobotName = "irb140",
     speed: Annotated[
-        list[float] | None, typer.Option(min=0.5, max=2.0, help="Walking speed [m/s]; several are allowed.")
+        list[float] | None, typer.Option(min=0.5, max=2.0, help="Walking speed [m/s]; may be repeated.")
     ] = None,
-    experiment: Annotated[list[str] | None, typer.Option(help="Only this experiment; several are allowed.")] = None,
+    experiment: Annotated[list[str] | None, typer.Option(help="Experiment to run; may be repeated.")] = None,
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
-    projection: Annotated[ProjectionName, typer.Option(help="Of the hierarchical law.")] = ProjectionName.strict,
-    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s].")] = 0.0,
+    projection: Annotated[
+        ProjectionName, typer.Option(help="Projection of the hierarchical law.")
+    ] = ProjectionName.strict,
+    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s].")] = 0.0,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
         "out/demo-fast-person"
     ),
@@ -102,8 +104,17 @@ def show(found: list[FastRun], screen: Console) -> None:
     """Print the table."""
     from qpsafe.cli.sheet import Sheet
 
-    speeds = ("robot then [m/s]", "closing [m/s]", "towards [m/s]")
-    headings = ("run", "walks [m/s]", "contact", "at [s]", "least gap [mm]", *speeds, "moving in contact [s]", "CDF_n")
+    speeds = ("robot speed [m/s]", "closing [m/s]", "towards [m/s]")
+    headings = (
+        "run",
+        "walks [m/s]",
+        "contact",
+        "at [s]",
+        "smallest distance [mm]",
+        *speeds,
+        "moving in contact [s]",
+        "CDF_n",
+    )
     sheet = Sheet("Somebody walks straight at the robot", headings)
     for run in found:
         e = run.encounter

@@ -39,12 +39,13 @@ def fixed(
     ] = "irb140",
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[
-        ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
+        ProjectionName,
+        typer.Option(help="Projection of the hierarchical law: paper reproduces (22), strict is lexicographic."),
     ] = ProjectionName.strict,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of how the person moves; 0 is nominal.")] = 0,
     lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
     ] = 0.0,
     duration: Annotated[
         float | None, typer.Option(min=0.1, max=600.0, help="Length of the run [s]; 60, or the story's.")
@@ -53,14 +54,15 @@ def fixed(
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
     cap: Annotated[
-        float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default it is not.")
+        float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default there is no cap.")
     ] = None,
     spots: Annotated[
-        str | None, typer.Option(help="Other sensors: a file in the robot's folder, as spots-by-hand.toml, or a path.")
+        str | None,
+        typer.Option(help="Other sensors: a file in the robot's folder, such as spots-by-hand.toml, or a path."),
     ] = None,
-    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the paper's.")] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of a story, instead of the paper's.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
-    video: Annotated[bool, typer.Option(help="Write an mp4, where OpenGL is to be had.")] = True,
+    video: Annotated[bool, typer.Option(help="Write an mp4; needs OpenGL.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:

@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 def path(
     robot: RobotName = "irb140",
-    seed: Annotated[int, typer.Option(min=0, help="Varies how the person moves; 0 is nominal.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of how the person moves; 0 is nominal.")] = 0,
     lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
     ] = 0.0,
     duration: Annotated[
         float | None, typer.Option(min=3.0, max=600.0, help="Length of each run [s]; 45, or the story's.")
     ] = None,
-    program: Annotated[Path | None, typer.Option(help="TOML file of what the tool follows.")] = None,
+    program: Annotated[Path | None, typer.Option(help="TOML file of the program that the tool follows.")] = None,
     unchecked: Annotated[
-        bool, typer.Option("--unchecked", help="Run a program that `qpsafe check` finds wrong all the same.")
+        bool, typer.Option("--unchecked", help="Run a program even if `qpsafe check` rejects it.")
     ] = False,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
-    story: Annotated[Path | None, typer.Option(help="TOML file of who does what, instead of the bundled.")] = None,
+    story: Annotated[Path | None, typer.Option(help="TOML file of a story, instead of the bundled one.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-path"),
-    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
+    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run; needs OpenGL.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:

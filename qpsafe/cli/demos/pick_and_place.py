@@ -37,30 +37,35 @@ if TYPE_CHECKING:
 
 def pick_and_place(
     robot: RobotName = "irb140",
-    seed: Annotated[int, typer.Option(min=0, help="Varies where, when and how fast people go; 0 is nominal.")] = 0,
-    seeds: Annotated[int, typer.Option(min=1, help="Run so many seeds, from --seed on, and print the spread.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of where, when and how fast people go; 0 is nominal.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds to run, from --seed on; prints the spread.")] = 1,
     cycles: Annotated[int, typer.Option(min=1, max=100, help="Screws to carry in each run.")] = 10,
-    people: Annotated[Path | None, typer.Option(help="TOML file of the people; by default two.")] = None,
-    program: Annotated[Path | None, typer.Option(help="TOML file of what the tool does.")] = None,
+    people: Annotated[
+        Path | None, typer.Option(help="TOML file of a story; by default the bundled two people.")
+    ] = None,
+    program: Annotated[Path | None, typer.Option(help="TOML file of the program that the tool follows.")] = None,
     unchecked: Annotated[
-        bool, typer.Option("--unchecked", help="Run a program that `qpsafe check` finds wrong all the same.")
+        bool, typer.Option("--unchecked", help="Run a program even if `qpsafe check` rejects it.")
     ] = False,
     lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Control lag of the plant [s]; EGM has 0.01-0.02.")
+        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
     ] = 0.0,
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[
-        ProjectionName, typer.Option(help="Of the hierarchical law: paper reproduces (22), strict is lexicographic.")
+        ProjectionName,
+        typer.Option(help="Projection of the hierarchical law: paper reproduces (22), strict is lexicographic."),
     ] = ProjectionName.strict,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
     sensor: Annotated[
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; by default one a processor.")] = os.cpu_count() or 1,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+    ] = os.cpu_count() or 1,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
         "out/demo-pick-and-place"
     ),
-    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run, where OpenGL is to be had.")] = False,
+    video: Annotated[bool, typer.Option(help="Write an mp4 of the first run; needs OpenGL.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the first run in MuJoCo's viewer.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:

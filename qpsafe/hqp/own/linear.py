@@ -130,7 +130,7 @@ def factorise(F: Array, chosen: Index, count: int, k: int, tau: Array, diagonal:
 
 @inline
 def least_squares(F: Array, count: int, rank: int, diagonal: Array, r: Array, u: Array) -> None:
-    """u = argmin ||L u - r|| for the L of [`factorise`][qpsafe.hqp.own.linear.factorise].
+    """u = argmin ||L u - r|| for the L of `factorise`.
 
     With as many rows as rank a forward substitution; else Householder QR of L, copied below row `count` of F, which
     overwrites r.
@@ -174,7 +174,7 @@ def least_squares(F: Array, count: int, rank: int, diagonal: Array, r: Array, u:
 
 @inline
 def unturn(F: Array, tau: Array, rank: int, k: int, p: Array) -> None:
-    """p = Qᵀ [u; 0] for p[:rank] = u and the Q of [`factorise`][qpsafe.hqp.own.linear.factorise]."""
+    """p = Qᵀ [u; 0] for p[:rank] = u and the Q of `factorise`."""
     for j in range(rank, k):
         p[j] = 0.0
     for step in range(rank - 1, -1, -1):

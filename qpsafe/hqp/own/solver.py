@@ -76,7 +76,7 @@ def solve_packed(
         damping: (levels,) singular values below it are damped; None for none.
 
     Returns:
-        q̇ (n,), and `info` of [`hierarchy.run`][qpsafe.hqp.own.hierarchy.run].
+        q̇ (n,), and `info` of `hierarchy.run`.
     """
     n = box_low.shape[0]
     floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)
