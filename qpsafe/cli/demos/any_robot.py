@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from qpsafe.cli.common import say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,17 +33,3 @@ def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6
     ready = made_ready(where, name, out, joints)
     say(screen, f"{ready.robot.name}:", ready.said)
     return ready.robot
-
-
-def say(screen: Console, heading: str, said: Sequence[str]) -> None:
-    """A short list; nothing where there is nothing to say.
-
-    Args:
-        screen: Where to.
-        heading: Above it.
-        said: What was chosen or added, in words.
-    """
-    if said:
-        screen.print(heading, style="yellow")
-        for line in said:
-            screen.print(f"  {line}", style="yellow")
