@@ -72,7 +72,7 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
-    from qpsafe.cli.demos.any_robot import READY, any_robot
+    from qpsafe.cli.demos.any_robot import any_robot, own_folder
     from qpsafe.irc5.axes import axes_of_robot
     from qpsafe.irc5.requests import Requests
     from qpsafe.sim.experiments.by_name import experiment_loop
@@ -105,7 +105,7 @@ def irc5_sim(
         raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
     found = load_named(robot, screen)
     if found.spots_path is None:
-        found = any_robot("qpsafe irc5-sim", robot, READY / Path(robot).stem, screen)
+        found = any_robot("qpsafe irc5-sim", robot, own_folder(robot), screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(

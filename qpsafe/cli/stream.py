@@ -214,11 +214,11 @@ def _controller(
             raise ConfigurationError(
                 "qpsafe stream", "--experiment", experiment.value, "no --program, no --cell with it"
             )
-        from qpsafe.cli.demos.any_robot import READY, any_robot
+        from qpsafe.cli.demos.any_robot import any_robot, own_folder
         from qpsafe.sim.experiments.by_name import experiment_loop
 
         if found.spots_path is None:
-            found = any_robot("qpsafe stream", robot, READY / Path(robot).stem, screen)
+            found = any_robot("qpsafe stream", robot, own_folder(robot), screen)
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller
     known = () if cell is None else load_cell(cell)

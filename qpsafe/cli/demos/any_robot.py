@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,10 @@ if TYPE_CHECKING:
 
     from qpsafe.robot.robot import Robot
 
-READY = Path("out/robots")  # where folders are made for robots that a command writes nothing else for
+
+def own_folder(name: str) -> Path:
+    """Where a folder is made for a robot by commands that write nothing else."""
+    return Path("out/robots") / re.sub(r"[^\w.-]+", "-", Path(name).stem)
 
 
 def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6) -> Robot:

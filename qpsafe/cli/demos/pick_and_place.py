@@ -81,8 +81,11 @@ def pick_and_place(
     from qpsafe.sim.experiments.pick_place.settings import PEOPLE
     from qpsafe.sim.world.known import known_obstacles
 
+    machine = any_robot("qpsafe demo pick-and-place", robot, out, screen)
+    if machine.name != ROBOT:
+        screen.print("looking for a layout of the cell that suits the arm (up to a minute) ...", style="dim")
     experiment = PickPlaceExperiment(
-        any_robot("qpsafe demo pick-and-place", robot, out, screen),
+        machine,
         make_law(law, projection, solver),
         seed=seed,
         cycles=cycles,
