@@ -18,6 +18,8 @@ from qpsafe.cli.outputs import output_folder
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from qpsafe.sim.web.watch import Watch
+
 LOCAL_WARNING = (
     "WARNING: everybody who reaches {host} and knows the token can use this page; nothing on the way is encrypted"
 )
@@ -116,3 +118,25 @@ def announce(screen: Console, host: str, address: str) -> None:
     if host not in LOCAL:
         screen.print(LOCAL_WARNING.format(host=host), style="bold yellow")
     screen.print(f"open {address} in a browser; Ctrl-C ends it", soft_wrap=True)
+
+
+def watch_stream(robot: str, experiment: str | None, at: tuple[str, int, str | None], screen: Console) -> Watch:
+    """The page of a stream, which only reads; waits until it answers: a browser may be opened before the robot moves.
+
+    Args:
+        robot: Name or path.
+        experiment: That is streamed, for its scene.
+        at: Host, port and token, if there is one.
+        screen: Where its address is said.
+    """
+    from qpsafe.sim.web.server import address_of, token_for
+    from qpsafe.sim.web.watch import Watch
+
+    host, port, token = at
+    token = token_for(host, token)
+    watch = Watch(robot, experiment, host, port, token)
+    if watch.wait():
+        announce(screen, host, address_of(host, port, token))
+    else:
+        screen.print("no page: its process does not answer", style="yellow")
+    return watch
