@@ -29,7 +29,9 @@ FLAGS = [
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = {"width": 760, "height": 620}  # little of the scene: it is drawn by software
 WIDE = {"width": 1180, "height": 640}
-READY = 60.0  # to load, and to compile if need be [s]
+WARM = 15.0  # until viser has found a resolution that software can draw [s]
+QUIET = 0.3  # without news a drag is over, what viser holds back included [s]
+READY = 90.0  # to load, to compile if need be, and to be drawn by a busy machine [s]
 
 
 def chromium() -> str | None:
@@ -62,6 +64,7 @@ class Tab:
     def __init__(self, browser: Any, address: str, size: dict[str, int] | None = None) -> None:
         self.complaints: list[str] = []
         self.page = browser.new_page(viewport=size or SIZE)
+        self.page.set_default_timeout(1e3 * READY)
         self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.goto(address)
@@ -123,19 +126,29 @@ class Tab:
         mouse, delays = self.page.mouse, []
         here, there = np.array(self.at(start)), np.array(self.at(end))
         mouse.move(*here)
-        self.page.wait_for_timeout(400)
+        self.page.wait_for_timeout(1e3 * WARM)
         mouse.down()
-        mouse.move(*(here + (there - here) / (count + 1)))
-        self.until(self.settled)
-        for k in range(2, count + 2):
-            self.page.wait_for_timeout(120)  # past what viser holds back
-            known = int(self.text("qp-wish").split()[0])
+        for k in range(1, count + 2):
+            known = self.quiet_wish()
             before = time.monotonic()
             mouse.move(*(here + (there - here) * k / (count + 1)))
-            self.until(lambda known=known: int(self.text("qp-wish").split()[0]) > known)  # type: ignore[misc]
+            self.until(lambda known=known: self.wish() > known)  # type: ignore[misc]
             delays.append(float(self.text("qp-wish").split()[1]) - before)
         mouse.up()
-        return delays
+        return delays[1:]  # the first one began the drag
+
+    def wish(self) -> int:
+        """Number of the newest wish that has been followed."""
+        return int(self.text("qp-wish").split()[0])
+
+    def quiet_wish(self) -> int:
+        """The same, once nothing more is on its way."""
+        known, since = -1, time.monotonic()
+        while time.monotonic() - since < QUIET:
+            if self.wish() != known or not self.settled():
+                known, since = self.wish(), time.monotonic()
+            self.page.wait_for_timeout(30)
+        return known
 
     def choose(self, label: str, option: str) -> None:
         """Choose in a dropdown of the open tab."""

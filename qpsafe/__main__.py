@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 
 from qpsafe.errors import MissingExtraError
@@ -12,7 +13,10 @@ def main() -> None:
     try:
         from qpsafe.cli.main import main as run
     except MissingExtraError as error:
-        sys.exit(f"qpsafe: {error}")
+        here = shlex.join(["qpsafe", *sys.argv[1:]])
+        sys.exit(
+            f"qpsafe: {error}, or 'qpsafe[sim]' for the demos (without installing: uvx --from 'qpsafe[sim]' {here})"
+        )
     run()
 
 

@@ -202,7 +202,8 @@ class SafetyController(Running):
             capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
             explained = seen.capped or not min(activations) >= 1.0 or capped
             still = float(np.abs(qd0).max()) < CALM
-            stall.watch(self._seq, self._tasks, self._law, recovery, commanded, self._qd, explained, still)
+            watched = self._tasks, self._law, recovery, commanded, self._qd
+            stall.watch(self._seq, *watched, explained, still, lambda: self._near(commanded))
         samples = recovery.update(cdf_n, commanded, activations)
         tasks, active, law = self._tasks, activations, self._law
         if recovery.way is not None:  # back through the joints

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, console, print_json, verdict, write_text
+from qpsafe.cli.common import RobotName, console, load_named, print_json, verdict, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
@@ -38,11 +38,10 @@ def check(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.check.check import check_path
     from qpsafe.check.report import to_dict
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sensing.cell_file import load_cell
     from qpsafe.tasks.program_file import ProgramError, load_program
 
-    found, known = load_robot(robot), () if cell is None else load_cell(cell)
+    found, known = load_named(robot, screen), () if cell is None else load_cell(cell)
     names = {"program": str(program), "cell": None if cell is None else str(cell)}
     try:
         plan = load_program(program, found)

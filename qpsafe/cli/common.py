@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from qpsafe.laws.problem import Law
+    from qpsafe.robot.robot import Robot
     from qpsafe.sim.experiments.shared.report import Check
 
 
@@ -69,6 +70,38 @@ class SensorName(StrEnum):
 
     ideal = "ideal"
     sharp = "sharp"
+
+
+def load_named(name: str, screen: Console) -> Robot:
+    """A robot; what is missing or doubtful in its files is said in a short list, not warned of.
+
+    Args:
+        name: What was typed.
+        screen: Where it is said.
+    """
+    import warnings
+
+    from qpsafe.robot.loader import load_robot
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = load_robot(name)
+    say(screen, f"{robot.name}:", robot.notes)
+    return robot
+
+
+def say(screen: Console, heading: str, said: Sequence[str]) -> None:
+    """A short list; nothing where there is nothing to say.
+
+    Args:
+        screen: Where to.
+        heading: Above it.
+        said: What was chosen or added, in words.
+    """
+    if said:
+        screen.print(heading, style="yellow")
+        for line in said:
+            screen.print(f"  {line}", style="yellow")
 
 
 def make_law(name: LawName, projection: ProjectionName, solver: str | None = None) -> Law:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, SensorName, console, print_json, write_text
+from qpsafe.cli.common import RobotName, SensorName, console, load_named, print_json, write_text
 from qpsafe.cli.outputs import output_file
 from qpsafe.cli.stream import Experiment
 from qpsafe.errors import ConfigurationError
@@ -91,10 +91,9 @@ def irc5_sim(
     from qpsafe.irc5 import realtime
 
     realtime.one_thread()
-    from qpsafe.cli.demos.any_robot import READY, any_robot
+    from qpsafe.cli.demos.any_robot import any_robot, own_folder
     from qpsafe.irc5.axes import axes_of_robot
     from qpsafe.irc5.requests import Requests
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.by_name import experiment_loop
     from qpsafe.sim.irc5.irc5_loop import Irc5Loop
     from qpsafe.sim.irc5.link import WireFaults
@@ -123,9 +122,9 @@ def irc5_sim(
     )
     if lockstep and todo:
         raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
-    found = load_robot(robot)
+    found = load_named(robot, screen)
     if found.spots_path is None:
-        found = any_robot("qpsafe irc5-sim", robot, READY / Path(robot).stem, screen)
+        found = any_robot("qpsafe irc5-sim", robot, own_folder(robot), screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(

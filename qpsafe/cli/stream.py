@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, make_law, print_json
+from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
@@ -246,25 +246,24 @@ def _controller(
     from qpsafe.check.check import check_path
     from qpsafe.cli.check import refuse_or_warn
     from qpsafe.controller import SafetyController
-    from qpsafe.robot.loader import load_robot
     from qpsafe.sensing.cell_file import load_cell
     from qpsafe.tasks.orientation import OrientationTask
     from qpsafe.tasks.position import PositionTask
     from qpsafe.tasks.program_file import load_program
     from qpsafe.tasks.trajectory import FixedPose
 
-    found = load_robot(robot)
+    screen = console(True) if checked is None else checked.screen
+    found = load_named(robot, screen)
     if experiment is not None:
         if program is not None or cell is not None:
             raise ConfigurationError(
                 "qpsafe stream", "--experiment", experiment.value, "no --program, no --cell with it"
             )
-        from qpsafe.cli.demos.any_robot import READY, any_robot
+        from qpsafe.cli.demos.any_robot import any_robot, own_folder
         from qpsafe.sim.experiments.by_name import experiment_loop
 
         if found.spots_path is None:
-            screen = console(True) if checked is None else checked.screen
-            found = any_robot("qpsafe stream", robot, READY / Path(robot).stem, screen)
+            found = any_robot("qpsafe stream", robot, own_folder(robot), screen)
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller
     known = () if cell is None else load_cell(cell)

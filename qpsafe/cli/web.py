@@ -41,6 +41,7 @@ def web(
         str | None, typer.Option(help="Whoever opens the page must know it; made up where it is needed.")
     ] = None,
     dark: Annotated[bool, typer.Option("--dark", help="A dark page.")] = False,
+    shadows: Annotated[bool, typer.Option(help="Draw shadows, which is slow without a graphics card.")] = True,
     open_: Annotated[bool, typer.Option("--open", help="Open it in this computer's browser.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for what is recorded.", callback=output_folder)] = Path("out/web"),
 ) -> None:
@@ -59,12 +60,13 @@ def web(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.web.app import TITLE, App
     from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
+    from qpsafe.sim.web.view import Looks
 
     setup = Setup(robot, HOLD if program is None else str(program), NOBODY if story is None else str(story))
     setup.experiment().start  # noqa: B018  what is wrong is said before anything is served
     page = Page(host, port, TITLE, token_for(host, token))
     try:
-        app = App(setup, page, out, dark)
+        app = App(setup, page, out, Looks(dark, shadows))
         try:
             announce(screen, host, page.address)
             if open_:

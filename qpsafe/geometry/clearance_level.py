@@ -44,8 +44,15 @@ class ClearanceLevel(Level):
 
     def binding(self, qd: Array) -> tuple[tuple[str, str, float], ...]:
         """Pairs of which a row binds at q̇ (n,) [rad/s]: names, and the smallest distance of such a row [m]."""
+        return self._nearest(~(self.A @ qd < self.upper - 1e-9))
+
+    def nearer(self, distance: float) -> tuple[tuple[str, str, float], ...]:
+        """Pairs that are nearer to each other than a distance [m], as `binding`."""
+        return self._nearest(self.gaps < distance)
+
+    def _nearest(self, chosen: NDArray[np.bool_]) -> tuple[tuple[str, str, float], ...]:
         found: dict[tuple[str, str], float] = {}
-        for pair, gap, value, upper in zip(self.pairs, self.gaps.tolist(), self.A @ qd, self.upper, strict=True):
-            if not value < upper - 1e-9:
+        for pair, gap, wanted in zip(self.pairs, self.gaps.tolist(), chosen.tolist(), strict=True):
+            if wanted:
                 found[pair] = min(gap, found.get(pair, math.inf))
         return tuple((*pair, gap) for pair, gap in found.items())

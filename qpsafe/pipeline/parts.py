@@ -42,7 +42,7 @@ from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.gate.gate import Gate
-    from qpsafe.hqp.level import Level
+    from qpsafe.geometry.clearance_level import ClearanceLevel
     from qpsafe.pipeline.stages import Stages
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
@@ -270,12 +270,17 @@ class Parts:
         """That led to the commanded velocity (n,) [rad/s²]."""
         return (self._qd - self._qd_before) / self._dt
 
-    def _kept_clear(self, commanded: RobotState) -> tuple[Level, ...]:
+    def _kept_clear(self, commanded: RobotState) -> tuple[ClearanceLevel, ...]:
         """Rows that keep the robot clear of furniture and itself; none where nothing can come too near."""
         if self._clearance is None or self._limits is None:
             return ()
         rows = self._clearance.level(commanded, self._qd, self._limits)
         return () if rows is None else (rows,)
+
+    def _near(self, commanded: RobotState) -> tuple[tuple[str, str, float], ...]:
+        """What the robot is kept clear of and comes near to: names, and distances up to twice the margin [m]."""
+        rows = self._kept_clear(commanded)
+        return rows[0].nearer(2.0 * self._clearance.margin) if rows and self._clearance is not None else ()
 
     def _kept_apart(self, measured: ArrayLike, points: NDArray[np.float64], ages: Any) -> tuple[SeparationLevel, ...]:
         """Rows that keep links from approaching what is seen too fast, at the measured position (n,) [rad]."""

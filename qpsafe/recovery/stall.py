@@ -6,7 +6,7 @@ reach, a way that joint limits block, or a law that does not come to rest: it wi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,14 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
+
+Near = Callable[[], tuple[tuple[str, str, float], ...]]
+
+
+def nothing_near() -> tuple[tuple[str, str, float], ...]:
+    """Nothing is kept clear of."""
+    return ()
+
 
 CALM = 0.01  # [rad/s] evasive velocity that does not explain motion
 _BUNDLED = (HierarchicalLaw, NullspaceLaw, WeightedLaw)  # an own law may keep from what nobody else knows
@@ -131,7 +139,7 @@ class StallWatch:
 
     def watch(
         self, tick: int, tasks: Sequence[Task], law: Law, recovery: Recovery, state: RobotState,
-        qd: NDArray[np.float64], explained: bool, calm: bool,
+        qd: NDArray[np.float64], explained: bool, calm: bool, near: Near = nothing_near,
     ) -> None:  # fmt: skip
         """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be.
 
@@ -143,13 +151,14 @@ class StallWatch:
             qd: Commanded velocity (n,) [rad/s].
             explained: Whether danger or a sensor explains whatever errors there are.
             calm: Whether nothing but tasks moves the robot.
+            near: Tells what the robot is kept clear of here: names and distances [m].
         """  # fmt: skip
         explained = explained or recovery.way is not None
         if explained and self.held:
             self.clear()
         if tick % self.every == 0:
             bundled = isinstance(law, _BUNDLED)
-            self.look(tasks, state, qd, recovery.path_time, explained, calm and bundled)
+            self.look(tasks, state, qd, recovery.path_time, explained, calm and bundled, near)
             if self.stalled and self.met is not None and bundled and recovery.lead(self.met):
                 self.clear()
 
@@ -161,6 +170,7 @@ class StallWatch:
         time: float,
         explained: bool,
         calm: bool,
+        near: Near = nothing_near,
     ) -> None:
         """Look once.
 
@@ -171,6 +181,7 @@ class StallWatch:
             time: On the path [s].
             explained: Whether danger or something else explains whatever errors there are.
             calm: Whether nothing but tasks moves the robot.
+            near: As for `watch`.
         """
         if tasks is not self._tasks:
             self._tasks = tasks
@@ -197,9 +208,11 @@ class StallWatch:
         self.held, self.stalled = bool(self._marks[HELD]), bool(self._marks[STALLED])
         if self._marks[SAID] != said:
             said = self._marks[SAID]
-            self.messages = (self._text(TEXTS[said], tasks, found, state),) if said else ()
+            self.messages = (self._text(TEXTS[said], tasks, found, state, near()),) if said else ()
 
-    def _text(self, what: str, tasks: Sequence[Task], found: list[Any], state: RobotState) -> str:
+    def _text(
+        self, what: str, tasks: Sequence[Task], found: list[Any], state: RobotState, near: tuple[Any, ...]
+    ) -> str:
         amounts = []
         for task, error in zip(tasks, found, strict=True):
             if task.essential and not float(np.linalg.norm(error)) <= self._tolerance:
@@ -215,5 +228,6 @@ class StallWatch:
             for side, there in sides
             if there[i]
         ]
+        at += [f"{link} {1e3 * gap:.1f} mm from {other}" for link, other, gap in near]
         why = "blocked by " + ", ".join(at) if at else "no joint at a limit: out of reach from this posture"
         return f"{what} ({', '.join(amounts) or 'met'}): {why}"

@@ -13,7 +13,7 @@ from qpsafe.sim.web.controls import Controls, Wishes
 from qpsafe.sim.web.handle import Handle
 from qpsafe.sim.web.process import LiveProcess, niced
 from qpsafe.sim.web.server import Page
-from qpsafe.sim.web.view import View
+from qpsafe.sim.web.view import PLAIN, Looks, View
 
 if TYPE_CHECKING:
     from qpsafe.sim.web.frame import Frame
@@ -34,28 +34,29 @@ class App:
         setup: What is simulated first.
         page: Where it is served.
         folder: Where recordings go.
-        dark: Whether the page is dark.
+        looks: Of the page.
 
     Attributes:
         live: The simulation.
+        wishes: What is asked of it.
         frame: The newest that has come; None before the first.
 
     Raises:
         ConfigurationError: The setup does not fit together.
     """
 
-    def __init__(self, setup: Setup, page: Page, folder: Path, dark: bool = False) -> None:
+    def __init__(self, setup: Setup, page: Page, folder: Path, looks: Looks = PLAIN) -> None:
         scene = setup.experiment().scene  # what is wrong is said before anything starts
         self.live = LiveProcess(setup, folder)
         niced()
         server = page.server
-        self._wishes, self._setup = Wishes(setup, self.live.wishes), setup
+        self.wishes, self._setup = Wishes(setup, self.live.wishes), setup
         self.frame: Frame | None = None
-        self.view = View(server, scene, dark)
+        self.view = View(server, scene, looks)
         tabs = self.view.tabs
-        self.controls = Controls(server.gui, self._wishes, tabs)
+        self.controls = Controls(server.gui, self.wishes, tabs)
         with tabs.add_tab("People"):
-            self.handle = Handle(server, self._wishes)
+            self.handle = Handle(server, self.wishes)
         with tabs.add_tab("Show"):
             self.view.add_looks()
         self._page = page
@@ -77,7 +78,7 @@ class App:
         frames = self.live.frames.received(WAIT)
         if self.live.frames.closed:
             raise SimulationEndedError("the simulation has ended by itself; what it said stands above")
-        self._wishes.remind()
+        self.wishes.remind()
         for frame in frames:
             self.view.take(frame)
         if not frames:
@@ -95,7 +96,7 @@ class App:
             self._setup = setup
         self.controls.follow(frame)
         if self._page.watched:
-            self.view.show(frame, asked=self._wishes.now.number)
+            self.view.show(frame, asked=self.wishes.now.number)
 
     def close(self) -> None:
         """End the simulation."""

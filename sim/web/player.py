@@ -68,7 +68,6 @@ class Player:
     Args:
         kept: The frames.
         page: Where they are shown.
-        dark: Whether it is dark.
 
     Attributes:
         view: What shows them.
@@ -76,11 +75,11 @@ class Player:
         playing: Whether time goes on.
     """
 
-    def __init__(self, kept: Kept, page: Page, dark: bool = False) -> None:
+    def __init__(self, kept: Kept, page: Page) -> None:
         self._frames, self._page = kept.frames, page
         self.position, self.playing, self._pace = 0, True, 1.0
         server = page.server
-        self.view = View(server, kept.scene, dark)
+        self.view = View(server, kept.scene)
         self.view.change(kept.scene, kept.activation)
         with self.view.tabs.add_tab("Time"):
             last = self._frames[-1].tick.reference.time

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -29,19 +29,30 @@ ANGLE = 45.0  # of view, vertical [deg]
 DRAWN = 1.0 / 30.0  # least time between two pictures [s]
 
 
+class Looks(NamedTuple):
+    """How a page looks at first; a machine without a graphics card is slow at shadows."""
+
+    dark: bool = False
+    shadows: bool = True
+
+
+PLAIN = Looks()
+
+
 class View:
     """Scene, plots, numbers and words of a page.
 
     Args:
         server: Viser's.
         scene: What is drawn first.
-        dark: Whether the page is dark.
+        looks: Dark or light, with shadows or without.
         distance: Whether anybody knows how far people are.
     """
 
-    def __init__(self, server: Any, scene: Scene, dark: bool = False, distance: bool = True) -> None:
-        self._server, self.dark = server, dark
+    def __init__(self, server: Any, scene: Scene, looks: Looks = PLAIN, distance: bool = True) -> None:
+        self._server, self.dark, self.shadows = server, looks.dark, looks.shadows
         self._theme()
+        server.scene.configure_default_lights(cast_shadow=looks.shadows)
         server.initial_camera.position, server.initial_camera.look_at = EYE, LOOK
         server.initial_camera.fov = np.radians(ANGLE)
         self.numbers = Numbers(server.gui)
@@ -60,7 +71,7 @@ class View:
 
     def add_looks(self) -> None:
         """Switches of what is drawn, into the tab whose context this is in."""
-        gui, danger = self._server.gui, self._danger
+        server, gui, danger = self._server, self._server.gui, self._danger
         for key, label in (
             ("rays", "sensors' rays"),
             ("points", "detected points"),
@@ -69,6 +80,8 @@ class View:
         ):
             box = gui.add_checkbox(label, getattr(danger, key))
             box.on_update(lambda event, key=key: setattr(self._danger, key, bool(event.target.value)))
+        shadows = gui.add_checkbox("shadows", self.shadows)
+        shadows.on_update(lambda event: server.scene.configure_default_lights(cast_shadow=bool(event.target.value)))
         dark = gui.add_checkbox("dark", self.dark)
         dark.on_update(lambda event: self._darken(bool(event.target.value)))
 

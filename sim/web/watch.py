@@ -40,7 +40,6 @@ class Watch:
         host: To serve the page at.
         port: Likewise.
         token: That the page asks for; empty for none.
-        dark: Whether the page is dark.
 
     Attributes:
         outbound: Where frames go.
@@ -51,13 +50,11 @@ class Watch:
         MissingExtraError: Viser is not installed.
     """
 
-    def __init__(
-        self, robot: str, experiment: str | None, host: str, port: int, token: str = "", dark: bool = False
-    ) -> None:
+    def __init__(self, robot: str, experiment: str | None, host: str, port: int, token: str = "") -> None:
         need_viser()
         check_port(host, port)
         reading, writing = one_way()
-        self._process = spawn(_serve, reading, robot, experiment, host, port, token, dark)
+        self._process = spawn(_serve, reading, robot, experiment, host, port, token)
         reading.close()
         self.host, self.port = host, port
         self.outbound = Outbound(writing)
@@ -114,7 +111,7 @@ class Watch:
 
 
 def _serve(
-    reading: Connection, robot: str, experiment: str | None, host: str, port: int, token: str, dark: bool
+    reading: Connection, robot: str, experiment: str | None, host: str, port: int, token: str
 ) -> None:  # fmt: skip
     """Show frames until nothing more comes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -126,7 +123,7 @@ def _serve(
 
     page = Page(host, port, "qpsafe stream: to be looked at only", token)
     with suppress(KeyboardInterrupt):
-        view = View(page.server, scene_of(robot, experiment), dark, distance=False)
+        view = View(page.server, scene_of(robot, experiment), distance=False)
         with view.tabs.add_tab("Show"):
             view.add_looks()
         show_all(inbound, view, page)

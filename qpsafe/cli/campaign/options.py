@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import console, progress_bar
-from qpsafe.cli.demos.any_robot import READY, any_robot
+from qpsafe.cli.demos.any_robot import any_robot, own_folder
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
     except ConfigurationError as wrong:
         raise ConfigurationError("qpsafe campaign", f"--{wrong.key}", wrong.value, wrong.expected) from None
     if find_robot(made.robot).suffix != ".toml":  # a bare model: a folder is made for it
-        ready = any_robot("qpsafe campaign", made.robot, READY / Path(made.robot).stem, console(True))
+        ready = any_robot("qpsafe campaign", made.robot, own_folder(made.robot), console(True))
         made = replace(made, robot=str(ready.folder))
     if load_robot(made.robot).spots_path is None:
         expected = "a robot with distance sensors (spots.toml)"

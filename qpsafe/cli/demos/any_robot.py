@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from qpsafe.cli.common import say
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.robot.robot import Robot
 
-READY = Path("out/robots")  # where folders are made for robots that a command writes nothing else for
+
+def own_folder(name: str) -> Path:
+    """Where a folder is made for a robot by commands that write nothing else."""
+    return Path("out/robots") / re.sub(r"[^\w.-]+", "-", Path(name).stem)
 
 
 def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6) -> Robot:
@@ -32,17 +37,3 @@ def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6
     ready = made_ready(where, name, out, joints)
     say(screen, f"{ready.robot.name}:", ready.said)
     return ready.robot
-
-
-def say(screen: Console, heading: str, said: Sequence[str]) -> None:
-    """A short list; nothing where there is nothing to say.
-
-    Args:
-        screen: Where to.
-        heading: Above it.
-        said: What was chosen or added, in words.
-    """
-    if said:
-        screen.print(heading, style="yellow")
-        for line in said:
-            screen.print(f"  {line}", style="yellow")

@@ -17,10 +17,11 @@ from qpsafe.cli.common import (
     make_law,
     print_json,
     progress_bar,
+    say,
     verdict,
     write_text,
 )
-from qpsafe.cli.demos.any_robot import any_robot, say
+from qpsafe.cli.demos.any_robot import any_robot
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 

@@ -15,10 +15,11 @@ from qpsafe.cli.common import (
     make_law,
     print_json,
     progress_bar,
+    say,
     show_checks,
     write_text,
 )
-from qpsafe.cli.demos.any_robot import any_robot, say
+from qpsafe.cli.demos.any_robot import any_robot
 from qpsafe.cli.demos.watching import observed
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError

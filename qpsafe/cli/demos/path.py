@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, console, print_json, progress_bar, show_checks, write_text
-from qpsafe.cli.demos.any_robot import any_robot, say
+from qpsafe.cli.common import RobotName, console, print_json, progress_bar, say, show_checks, write_text
+from qpsafe.cli.demos.any_robot import any_robot
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 

@@ -17,10 +17,11 @@ from qpsafe.cli.common import (
     make_law,
     print_json,
     progress_bar,
+    say,
     show_checks,
     write_text,
 )
-from qpsafe.cli.demos.any_robot import any_robot, say
+from qpsafe.cli.demos.any_robot import any_robot
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
 from qpsafe.text.words import counted
@@ -85,8 +86,11 @@ def pick_and_place(
     from qpsafe.sim.experiments.pick_place.settings import PEOPLE
     from qpsafe.sim.world.known import known_obstacles
 
+    machine = any_robot("qpsafe demo pick-and-place", robot, out, screen)
+    if machine.name != ROBOT:
+        screen.print("looking for a layout of the cell that suits the arm (up to a minute) ...", style="dim")
     experiment = PickPlaceExperiment(
-        any_robot("qpsafe demo pick-and-place", robot, out, screen),
+        machine,
         make_law(law, projection, solver),
         seed=seed,
         cycles=cycles,

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from qpsafe.placement.sight import SelfSight
 from qpsafe.sensing.body import body_hulls
+from qpsafe.sim.experiments.shared.home import Arm
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+WRIST = 3  # joints at the end of an arm whose links carry none; fewer where it has fewer than six
 SHORT, LONG = 0.08, 0.25  # links shorter than that carry none; longer ones two rings [m]
 BARE = 0.04  # from the wire, where there is no surface [m]
 OFF = 0.005  # from the surface [m]
@@ -91,7 +93,7 @@ def _rings(robot: Robot, link: int) -> list[list[Place]]:
     ends = np.stack((wire.starts[link], wire.ends[link])) @ to_frame[:3, :3].T + to_frame[:3, 3]
     axis = ends[1] - ends[0]
     length = float(np.linalg.norm(axis))
-    if body == 0 or length < SHORT:  # what stands endangers nobody
+    if body == 0 or body in _wrists(robot) or length < SHORT:  # what stands endangers nobody
         return []
     axis /= length
     across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
@@ -108,6 +110,12 @@ def _rings(robot: Robot, link: int) -> list[list[Place]]:
             ring.append(Place(link, start, centre + (far + OFF) * direction, direction))
         found.append(ring)
     return found
+
+
+def _wrists(robot: Robot) -> set[int]:
+    """Bodies of every arm's wrist: it works close to tables, which a sensor there would take for danger."""
+    arms = [Arm.of(robot, tool).joints for tool in robot.tool_frames]
+    return {joint + 1 for joints in arms for joint in joints[len(joints) - min(WRIST, max(len(joints) - 3, 0)) :]}
 
 
 def _exit(vertices: Array, origin: Array, ray: Array) -> float:

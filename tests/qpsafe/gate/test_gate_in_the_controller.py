@@ -57,6 +57,13 @@ def test_a_wall_in_the_way_is_not_touched_and_named() -> None:
     assert ROBOT.pose("tcp", free[-1].reference.q)[0, 3] > POSE[0, 3] + 0.2  # it does go there otherwise
 
 
+def test_what_holds_the_arm_off_its_goal_is_named() -> None:
+    said = run(towards(0.3, known=[WALL]), 1200)[-1].messages
+    assert "stands off its goals" in said[0]
+    assert "mm from wall" in said[0]
+    assert "out of reach" not in said[0]
+
+
 def test_with_nothing_in_the_way_it_changes_nothing() -> None:
     for with_gate, without in zip(run(towards(0.1), 200), run(towards(0.1, gate="off"), 200), strict=True):
         np.testing.assert_array_equal(with_gate.reference.q, without.reference.q)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from qpsafe.sim.experiments.pick_place.for_robot import HANDS, work_for
 from qpsafe.sim.experiments.pick_place.report import figures
 from qpsafe.sim.experiments.shared.home import GOOD, Arm, Touching, quality
 from qpsafe.sim.experiments.shared.ready import made_ready
-from qpsafe.sim.experiments.shared.report import Check, all_kept
+from qpsafe.sim.experiments.shared.report import Check, all_kept, summarise
 from qpsafe.sim.replay.settings import experiment_of, settings_of
 from qpsafe.sim.world.rays import SpotRays
 from qpsafe.sim.world.tool_axis import tool_axis
@@ -128,6 +129,26 @@ def test_its_work_is_in_reach_and_people_come_to_where_it_is(arms: Any, tmp_path
     np.testing.assert_array_equal(again.start, experiment.start)
     assert again.cell == experiment.cell
     assert again.story.table == experiment.story.table
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ur5", "panda", "xarm7"])
+def test_models_of_other_packages_hold_their_pose_and_follow_a_line(name: str, tmp_path: Path) -> None:
+    """Real arms, nothing about them stated here: the whole first experiment keeps what counts."""
+    try:
+        metadata.distribution("example-robot-data")
+    except metadata.PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed: pip install 'qpsafe[models]'")
+    made = made_ready("test", f"example_robot_data:{name}", tmp_path, 6)
+    robot = made.robot
+    assert quality(robot, Arm.of(robot), robot.home) > 0.5 * GOOD
+    assert check_path(robot, parse_program(line_for(robot), "line", robot), sensors=False).good
+    experiment = FixedExperiment(robot)
+    log = experiment.run()
+    without = experiment.board_distance_without_controller()
+    report = summarise(log, without, experiment.windows(), robot, tuned=False)
+    assert report.kept, [check for check in report.checks if not check.kept]
+    assert (log.regime == "high").any()  # it saw somebody
 
 
 @pytest.mark.parametrize(("joints", "command"), [(3, "fixed"), (5, "path"), (5, "pick-and-place"), (3, "fast-person")])

@@ -23,11 +23,12 @@ pytestmark = pytest.mark.web
 Open = Callable[..., Tab]
 Start = Callable[..., Program]
 
+WEB = ("web", "--no-shadows", "--port", "0")
 ARROW = (1.85, 0.5, 0.0)  # on the arrow along x of who stands at (1.6, 0.5)
 
 
 def test_who_is_dragged_to_the_robot_is_evaded(tab: Open, program: Start) -> None:
-    shown = tab(program("web", "--port", "0").address, WIDE)
+    shown = tab(program(*WEB).address, WIDE)
     shown.until(lambda: shown.text("qp-phase") == "following")
     before, joints = shown.number("qp-distance"), shown.joints()
     shown.drag(ARROW, (0.95, 0.5, 0.0))
@@ -40,7 +41,7 @@ def test_who_is_dragged_to_the_robot_is_evaded(tab: Open, program: Start) -> Non
 
 
 def test_switches_work(tab: Open, program: Start) -> None:
-    shown = tab(program("web", "--port", "0").address)
+    shown = tab(program(*WEB).address)
     shown.open("In words")
     shown.until(lambda: "QP of weight" in shown.text("qp-words"))
     shown.open("Control")
@@ -66,7 +67,7 @@ def test_switches_work(tab: Open, program: Start) -> None:
 
 
 def test_the_clock_stands_steps_and_goes_on(tab: Open, program: Start) -> None:
-    shown = tab(program("web", "--port", "0").address)
+    shown = tab(program(*WEB).address)
     shown.page.get_by_role("button", name="pause").click()
     shown.until(lambda: shown.text("qp-state") == "paused")
     shown.page.wait_for_timeout(400)
@@ -81,7 +82,7 @@ def test_the_clock_stands_steps_and_goes_on(tab: Open, program: Start) -> None:
 
 
 def test_what_is_recorded_replays(tab: Open, program: Start) -> None:
-    serving = program("web", "--port", "0")
+    serving = program(*WEB)
     shown = tab(serving.address)
     shown.page.get_by_role("button", name="record").click()
     shown.until(lambda: shown.text("qp-state") == "recording" and shown.number("qp-time") > 1.0)
@@ -92,7 +93,7 @@ def test_what_is_recorded_replays(tab: Open, program: Start) -> None:
 
 
 def test_two_tabs_show_the_same_and_either_one_switches(tab: Open, program: Start) -> None:
-    address = program("web", "--port", "0").address
+    address = program(*WEB).address
     one, other = tab(address), tab(address)
     one.open("Control")
     other.open("Control")
@@ -104,7 +105,7 @@ def test_two_tabs_show_the_same_and_either_one_switches(tab: Open, program: Star
 
 
 def test_a_reload_finds_the_same_run(tab: Open, program: Start) -> None:
-    shown = tab(program("web", "--port", "0").address)
+    shown = tab(program(*WEB).address)
     at = shown.number("qp-time")
     shown.page.reload()
     shown.page.wait_for_selector("#qp-distance")
@@ -149,7 +150,7 @@ def wire_to(port: int) -> Iterator[tuple[int, Callable[[], None]]]:
 
 
 def test_a_connection_that_drops_comes_back_by_itself(tab: Open, program: Start) -> None:
-    serving = program("web", "--port", "0")
+    serving = program(*WEB)
     port = int(serving.address.rpartition(":")[2].strip("/"))
     with wire_to(port) as (own, cut):
         shown = tab(f"http://127.0.0.1:{own}/")
@@ -164,12 +165,12 @@ def test_a_connection_that_drops_comes_back_by_itself(tab: Open, program: Start)
 
 
 def test_ctrl_c_ends_it_cleanly_and_the_port_is_free_again(tab: Open, program: Start) -> None:
-    serving = program("web", "--port", "0")
+    serving = program(*WEB)
     port = serving.address.rpartition(":")[2].strip("/")
     tab(serving.address).page.close()
     assert serving.interrupt() == 0
     assert "Traceback" not in serving.said
-    again = program("web", "--port", port)
+    again = program(*WEB[:-1], port)
     assert again.interrupt() == 0
 
 
@@ -191,7 +192,7 @@ def test_a_recorded_run_has_a_slider(tab: Open, program: Start, tmp_path: Path) 
 
 def test_a_drag_reaches_the_robot_within_a_tenth_of_a_second(tab: Open, program: Start) -> None:
     """From before the mouse moves to the end of the first tick that counts with it, both by the monotonic clock."""
-    shown = tab(program("web", "--port", "0").address, WIDE)
+    shown = tab(program(*WEB).address, WIDE)
     delays = shown.drag_delays(ARROW, (1.2, 0.5, 0.0), 25)
     print("drag to robot [ms]:", np.round(1e3 * np.array(delays)).tolist())
     assert float(np.median(delays)) < 0.1

@@ -1,0 +1,92 @@
+"""Pictures of the page: docs/img/web*.png, as Chromium shows them: python docs/figures_web.py [NAME ...]"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "img"
+sys.path.insert(0, str(ROOT / "benchmarks"))  # where the browser is steered from
+
+from browser import Program, Tab, chromium, launched  # noqa: E402
+
+SIZE = {"width": 1320, "height": 780}
+ARROW = (1.85, 0.5, 0.0)
+
+
+def quiet(shown: Tab) -> None:
+    """Close the notice that WebGL is software here."""
+    notice = shown.page.locator(".mantine-Notification-closeButton")
+    while notice.count():
+        notice.first.click()
+        shown.page.wait_for_timeout(300)
+
+
+def picture(shown: Tab, name: str) -> None:
+    """Take a picture, with the mouse out of the way."""
+    quiet(shown)
+    shown.page.mouse.move(5, 400)
+    shown.page.wait_for_timeout(1500)
+    shown.page.screenshot(path=IMAGES / f"{name}.png", timeout=120_000)
+
+
+def web(browser: Any, folder: Path) -> None:
+    """Somebody is dragged to the robot, which makes way."""
+    program = Program(["web", "--port", "0"], folder)
+    shown = Tab(browser, program.address, SIZE)
+    shown.page.wait_for_timeout(3000)
+    shown.drag(ARROW, (1.07, 0.5, 0.0))
+    shown.until(lambda: shown.number("qp-cdf") > 5.0)
+    shown.page.wait_for_timeout(4000)
+    picture(shown, "web")
+    program.interrupt()
+
+
+def dark(browser: Any, folder: Path) -> None:
+    """A hand before another robot, on a dark page, with the tick in words."""
+    program = Program(["web", "--port", "0", "--robot", "iiwa14", "--dark"], folder)
+    shown = Tab(browser, program.address, SIZE)
+    shown.open("In words")
+    shown.open("People")
+    shown.choose("drag with the mouse", "hand")
+    shown.until(lambda: shown.number("qp-cdf") > 5.0)
+    shown.page.wait_for_timeout(3000)
+    picture(shown, "web-dark")
+    program.interrupt()
+
+
+def recorded(browser: Any, folder: Path) -> None:
+    """The first experiment, recorded, in the moment of high danger."""
+    run = folder / "run"
+    Program(["demo", "fixed", "--duration", "14", "--no-video", "--out", str(run)], folder, serves=False).process.wait()
+    program = Program(["replay", str(run / "run.npz"), "--web", "--web-port", "0"], folder)
+    shown = Tab(browser, program.address, SIZE)
+    shown.page.get_by_role("button", name="play or pause").click()
+    field = shown.page.locator("input[inputmode='decimal']").first
+    field.fill("9.6")
+    field.press("Enter")
+    shown.until(lambda: abs(shown.number("qp-time") - 9.6) < 0.1)
+    picture(shown, "web-replay")
+    program.interrupt()
+
+
+PICTURES: dict[str, Callable[[Any, Path], None]] = {"web": web, "dark": dark, "recorded": recorded}
+
+
+def main(names: list[str]) -> None:
+    """Draw some, or all."""
+    path = chromium()
+    if path is None:
+        raise SystemExit("figures_web: needs Chromium")
+    for name in names or list(PICTURES):
+        with launched(path) as browser, tempfile.TemporaryDirectory() as folder:
+            PICTURES[name](browser, Path(folder))
+            print(f"drawn: {name}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
