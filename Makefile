@@ -43,6 +43,7 @@ $(TYPED):
 	@for name in tasks robots sim; do ln -sfn $(CURDIR)/$$name $@/qpsafe/$$name; done
 
 docs: $(VENV)/.docs ## the site, in build/docs/html; a warning is an error
+	$(BIN)/python docs/recordings.py build/recordings
 	$(BIN)/python -m sphinx -E -W --keep-going -q -j auto -b html -d build/docs/doctrees docs build/docs/html
 	$(BIN)/python docs/site_pages/links.py build/docs/html
 	@echo "docs: build/docs/html/index.html"

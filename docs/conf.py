@@ -44,6 +44,7 @@ nitpick_ignore_regex = [("py:(?!obj).*", ".*")]  # types in signatures: whatever
 
 html_theme = "furo"
 html_title = f"qpsafe {release}"
+html_extra_path = ["../build/recordings"] if (HERE.parent / "build" / "recordings").exists() else []
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_theme_options = {"navigation_with_keys": True}

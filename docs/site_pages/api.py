@@ -59,7 +59,7 @@ def package_page(package: str, inside: list[Module]) -> str:
     """Page of a package: each of its modules with all public names."""
     parts = [title(package), f".. automodule:: {package}\n   :no-members:\n"]
     if package == "qpsafe":
-        parts = [title("qpsafe, its modules")]
+        parts = [title("qpsafe, its modules"), ".. py:module:: qpsafe\n"]
     for module in inside:
         parts += module_part(module)
     return "\n".join(parts)

@@ -142,7 +142,7 @@ def modules() -> dict[str, Module]:
     for top, folder in TOPS.items():
         for path in sorted((ROOT / folder).rglob("*.py")):
             parts = path.relative_to(ROOT / folder).with_suffix("").parts
-            if path.name.endswith("_pb2.py") or not (path.parent / "__init__.py").exists():
+            if path.name.endswith(("_pb2.py", "__main__.py")) or not (path.parent / "__init__.py").exists():
                 continue  # generated
             if path.is_relative_to(COMMANDS):
                 continue

@@ -7,14 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from docutils.parsers.rst import Directive
 from pygments.lexers.special import TextLexer
 from sphinx.addnodes import pending_xref, pending_xref_condition
 
 from site_pages import api, commands
-from site_pages.catalogue import modules, targets
+from site_pages.catalogue import ROOT, modules, targets
 from site_pages.markup import converted, scopes_of, where
 
 BEFORE_NAPOLEON = 400
+RECORDINGS = ROOT / "build" / "recordings"
 
 
 def on_init(app: Any) -> None:
@@ -57,11 +59,30 @@ def on_missing(app: Any, env: Any, node: pending_xref, content: nodes.Element) -
     return env.domains.python_domain.resolve_xref(env, node["refdoc"], app.builder, "obj", owner, node, content)
 
 
+class Recording(Directive):
+    """A moving picture of build/recordings, if `docs/recordings.py` has made it; its caption in any case."""
+
+    required_arguments = 1
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        """The frame and what is written under it."""
+        env = self.state.document.settings.env
+        file, up = f"{self.arguments[0]}.html", "../" * env.docname.count("/")
+        if not (RECORDINGS / file).exists():
+            return []
+        frame = f'<iframe class="recording" loading="lazy" src="{up}{file}" title="{self.arguments[0]}"></iframe>'
+        caption = nodes.paragraph()
+        self.state.nested_parse(self.content, self.content_offset, caption)
+        return [nodes.raw("", frame, format="html"), *caption.children]
+
+
 def setup(app: Any) -> dict[str, Any]:
     """What Sphinx calls."""
     app.connect("builder-inited", on_init)
     app.connect("autodoc-process-docstring", on_docstring, priority=BEFORE_NAPOLEON)
     app.connect("doctree-read", on_types)
+    app.add_directive("recording", Recording)
     app.add_lexer("mermaid", TextLexer)
     app.connect("missing-reference", on_missing)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

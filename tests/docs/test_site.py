@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -15,16 +16,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "docs"))
 
 from site_pages import api, links  # noqa: E402
-from site_pages.catalogue import exported, modules, targets  # noqa: E402
+from site_pages.catalogue import exported, modules, path_of, targets  # noqa: E402
 from site_pages.markup import converted, marked, where  # noqa: E402
 
 
 def docstrings() -> list[tuple[str, str, list[str]]]:
     """(place, text, scopes) of every docstring of the package."""
-    import ast
-
-    from site_pages.catalogue import path_of
-
     found = []
     for module in modules().values():
         path = path_of(module.name)

@@ -1,0 +1,53 @@
+"""Moving pictures for the site, one HTML file each, to be turned with the mouse: python docs/recordings.py FOLDER.
+
+A file holds viser's page and about a megabyte of motion, so it is made and not committed.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import qpsafe
+from qpsafe.sensing.spots import load_spots
+from qpsafe.sim.drawing.film import medium_and_high
+from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.sim.web.bodies import Bodies
+from qpsafe.sim.web.danger import Danger
+from qpsafe.sim.web.server import Page
+from qpsafe.sim.web.view import EYE, LOOK
+
+EVERY = 25  # ticks: ten pictures a second
+DURATION = 15.0  # the first approach and the way back [s]
+
+
+def first_experiment() -> str:
+    """The first approach of the first experiment: rays, points, danger vectors, links coloured by danger."""
+    robot = qpsafe.load_robot("irb140")
+    experiment = FixedExperiment(robot, duration=DURATION)
+    page = Page("127.0.0.1", 0, "first experiment")
+    try:
+        server = page.server
+        server.initial_camera.position, server.initial_camera.look_at = EYE, LOOK
+        bodies = Bodies(server, experiment.scene)
+        thresholds = medium_and_high(qpsafe.robot_activation(robot))
+        danger = Danger(server, experiment.scene, load_spots(robot), bodies, thresholds)
+        recorded = server.get_scene_serializer()
+
+        def watch(tick: Any, scene: Any, plant: Any) -> None:
+            if tick.reference.seq % EVERY == 0:
+                bodies.show(plant.data)
+                danger.show(tick, plant.q)
+                recorded.insert_sleep(EVERY * 0.004)
+
+        experiment.run(watch)
+        return recorded.as_html()
+    finally:
+        page.close()
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "first-experiment.html").write_text(first_experiment(), encoding="utf-8")
