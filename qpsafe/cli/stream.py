@@ -90,12 +90,12 @@ def stream(
     log: Annotated[
         Path | None, typer.Option(help="Log of the references, .csv or .qpref.", callback=output_file(".csv", ".qpref"))
     ] = None,
-    web: Annotated[bool, typer.Option("--web", help="Show it in the browser; nothing comes back from there.")] = False,
-    web_host: Annotated[str, typer.Option(help="Address of the page; any but this computer's own needs a token.")] = (
-        "127.0.0.1"
-    ),
+    web: Annotated[bool, typer.Option("--web", help="Show the stream in the browser; the page is read-only.")] = False,
+    web_host: Annotated[
+        str, typer.Option(help="Address of the page; any but this computer's own requires a token.")
+    ] = ("127.0.0.1"),
     web_port: Annotated[int, typer.Option(min=0, max=65535, help="Its port.")] = 8080,
-    web_token: Annotated[str | None, typer.Option(help="Whoever opens it must know; made up where needed.")] = None,
+    web_token: Annotated[str | None, typer.Option(help="Token that the page asks for; generated where needed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """Stream joint references to an IRC5 at its own pace (250 Hz). Ctrl-C ramps out before leaving.
