@@ -92,6 +92,11 @@ def peers() -> str:
     rows = [f"| trouble | {' | '.join(titles)} |", "|" + " --- |" * (1 + len(names))]
     for trouble, head in heads.items():
         rows.append(f"| {head} | {' | '.join(told(trouble, found[name][trouble]) for name in names)} |")
+    speeds = (f"{speed:.1f} rad/s with {damping}" for damping, speed in found["mink"]["damped"].items())
+    rows += [
+        "",
+        f"With Levenberg-Marquardt damping (`lm_damping`) mink ends the third line at {' and at '.join(speeds)}.",
+    ]
     return "\n".join(rows)
 
 

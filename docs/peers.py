@@ -179,6 +179,21 @@ def given_of(robot: Any) -> dict[str, Any]:
     }
 
 
+def damped(robot: Any, given: dict[str, Any]) -> dict[str, float]:
+    """mink's largest joint speed in the last second beyond reach, by Levenberg-Marquardt damping [rad/s].
+
+    Args:
+        robot: The robot.
+        given: See `given_of`.
+    """
+    found, home, pose = {}, np.array(given["home"]), np.array(given["pose"])
+    for damping in (0.1, 1.0):
+        peer = Mink(robot, home, pose)
+        peer.task.lm_damping = damping
+        found[f"{damping:g}"] = run(peer, BEYOND, home, pose, np.array(given["a_max"]))["last"]
+    return found
+
+
 def main() -> None:
     """Run them all."""
     import qpsafe
@@ -198,6 +213,7 @@ def main() -> None:
     ):
         done = troubles(lambda q, pose, kind=kind: kind(robot, q, pose), given)
         found[name] = {"version": version(package), **done}
+    found["mink"]["damped"] = damped(robot, given)
     if python:
         script = Path(__file__).with_name("peers_placo.py")
         done = subprocess.run([python, script], input=json.dumps(given), capture_output=True, text=True, check=True)
