@@ -61,7 +61,7 @@ def engine() -> str:
 def peers() -> str:
     """What becomes of the same troubles in other libraries and here, a line a trouble."""
     found = committed("peers")
-    names = ("mink", "pink", "placo", "qpsafe")
+    names = ("mink", "pink", "pink, `AccelerationLimit`", "placo", "qpsafe")
 
     def told(trouble: str, run: dict[str, Any]) -> str:
         if "raises" in run:
@@ -78,7 +78,8 @@ def peers() -> str:
         if trouble == "jump":
             return hard
         if trouble == "beyond":
-            return f"{run['last']:.1f} rad/s, {run['reversals']} reversals" if run["last"] else "at rest"
+            turns = f", {run['reversals']} reversals" if run["reversals"] else ""
+            return f"still {run['last']:.1f} rad/s{turns}" if run["last"] else "at rest"
         return "stays at rest" if run["fastest"] == 0.0 else f"brakes, {hard}"
 
     heads = {
@@ -88,9 +89,14 @@ def peers() -> str:
         "unreadable": "one measurement is NaN",
     }
     titles = [f"{name} {found[name]['version']}" for name in names]
-    rows = [f"| trouble | {' | '.join(titles)} |", "| --- | --- | --- | --- | --- |"]
+    rows = [f"| trouble | {' | '.join(titles)} |", "|" + " --- |" * (1 + len(names))]
     for trouble, head in heads.items():
         rows.append(f"| {head} | {' | '.join(told(trouble, found[name][trouble]) for name in names)} |")
+    speeds = (f"{speed:.1f} rad/s with {damping}" for damping, speed in found["mink"]["damped"].items())
+    rows += [
+        "",
+        f"With Levenberg-Marquardt damping (`lm_damping`) mink ends the third line at {' and at '.join(speeds)}.",
+    ]
     return "\n".join(rows)
 
 

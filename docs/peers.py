@@ -68,6 +68,28 @@ class Pink:
         return self.pink.solve_ik(self.configuration, [self.task], DT, "daqp", safety_break=False)
 
 
+class PinkAccelerated(Pink):
+    """Pink with its acceleration limit beside the other two."""
+
+    def __init__(self, robot: Any, q: Array, target: Array) -> None:
+        super().__init__(robot, q, target)
+        model = self.configuration.model
+        self.acceleration = self.pink.limits.AccelerationLimit(model, robot.max_acceleration.copy())
+        self.limits = [
+            self.pink.limits.ConfigurationLimit(model),
+            self.pink.limits.VelocityLimit(model),
+            self.acceleration,
+        ]
+
+    def step(self, q: Array, qd: Array, target: Array) -> Array:
+        """Joint velocity for a measured position."""
+        self.task.set_target(self.pin.SE3(target))
+        self.configuration.update(np.array(q))
+        self.acceleration.set_last_integration(qd, DT)
+        tasks = [self.task]
+        return self.pink.solve_ik(self.configuration, tasks, DT, "daqp", limits=self.limits, safety_break=False)
+
+
 class Qpsafe:
     """The controller, nobody in sight; position before orientation, each with the others' gain."""
 
@@ -157,6 +179,21 @@ def given_of(robot: Any) -> dict[str, Any]:
     }
 
 
+def damped(robot: Any, given: dict[str, Any]) -> dict[str, float]:
+    """mink's largest joint speed in the last second beyond reach, by Levenberg-Marquardt damping [rad/s].
+
+    Args:
+        robot: The robot.
+        given: See `given_of`.
+    """
+    found, home, pose = {}, np.array(given["home"]), np.array(given["pose"])
+    for damping in (0.1, 1.0):
+        peer = Mink(robot, home, pose)
+        peer.task.lm_damping = damping
+        found[f"{damping:g}"] = run(peer, BEYOND, home, pose, np.array(given["a_max"]))["last"]
+    return found
+
+
 def main() -> None:
     """Run them all."""
     import qpsafe
@@ -168,9 +205,15 @@ def main() -> None:
     given = given_of(robot)
     before = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     found = {"placo": before["placo"]} if "placo" in before and not python else {}
-    for name, kind, package in (("mink", Mink, "mink"), ("pink", Pink, "pin-pink"), ("qpsafe", Qpsafe, "qpsafe")):
+    for name, kind, package in (
+        ("mink", Mink, "mink"),
+        ("pink", Pink, "pin-pink"),
+        ("pink, `AccelerationLimit`", PinkAccelerated, "pin-pink"),
+        ("qpsafe", Qpsafe, "qpsafe"),
+    ):
         done = troubles(lambda q, pose, kind=kind: kind(robot, q, pose), given)
         found[name] = {"version": version(package), **done}
+    found["mink"]["damped"] = damped(robot, given)
     if python:
         script = Path(__file__).with_name("peers_placo.py")
         done = subprocess.run([python, script], input=json.dumps(given), capture_output=True, text=True, check=True)

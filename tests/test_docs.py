@@ -28,7 +28,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: Examples that take an argument to be shorter.
 ARGUMENTS = {"compare_to_nullspace.py": ["180"], "mink_evasion.py": ["--steps", "500"]}
 
-FENCE = re.compile(r"^```([\w{}]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```([\w{}]*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 
 

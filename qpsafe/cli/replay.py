@@ -26,12 +26,12 @@ def replay(
         Path | None, typer.Option(help="Also film the recorded run to this mp4.", callback=output_file(".mp4"))
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Also show it in MuJoCo's viewer; needs a display.")] = False,
-    web: Annotated[bool, typer.Option("--web", help="Then show it in the browser, with a time slider.")] = False,
-    web_host: Annotated[str, typer.Option(help="Address of the page; any but this computer's own needs a token.")] = (
-        "127.0.0.1"
-    ),
-    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0 for any free one.")] = 8080,
-    web_token: Annotated[str | None, typer.Option(help="Whoever opens it must know; made up where needed.")] = None,
+    web: Annotated[bool, typer.Option("--web", help="Then show the run in the browser, with a time slider.")] = False,
+    web_host: Annotated[
+        str, typer.Option(help="Address of the page; any but this computer's own requires a token.")
+    ] = ("127.0.0.1"),
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 for any free one.")] = 8080,
+    web_token: Annotated[str | None, typer.Option(help="Token that the page asks for; generated where needed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
     """Run the controller again on a run's recorded inputs and compare every answer with the recorded one, bit by bit.

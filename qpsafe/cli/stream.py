@@ -42,9 +42,7 @@ class Acknowledge(StrEnum):
 
 def stream(
     robot: RobotName = "irb140",
-    host: Annotated[str, typer.Option(help="Address or interface of this computer that the robot sends to.")] = (
-        "127.0.0.1"
-    ),
+    host: Annotated[str, typer.Option(help="Address or interface that the robot sends to.")] = ("127.0.0.1"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6510,
     peer: Annotated[str | None, typer.Option(help="Address of the robot; by default the first sender.")] = None,
     program: Annotated[
@@ -65,23 +63,21 @@ def stream(
     sensor_port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6511,
     sensors: Annotated[
         bool,
-        typer.Option(
-            "--sensors/--no-sensors", help="Use distances; without them the robot sees nobody, for tests only."
-        ),
+        typer.Option("--sensors/--no-sensors", help="Use distances; else the robot sees nobody: tests only."),
     ] = True,
     events: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Address to send the names of events to; empty: none.")
     ] = "127.0.0.1:6512",
     duration: Annotated[float | None, typer.Option(min=0.1, help="Stop after streaming for this long [s].")] = None,
     patience: Annotated[
-        float, typer.Option(min=0.0, help="Stop when the robot has been silent for this long [s]; 0: never.")
+        float, typer.Option(min=0.0, help="Stop after this silence of the robot [s]; 0: never.")
     ] = 15.0,
     ramp_in: Annotated[
         float, typer.Option(min=0.01, max=10.0, help="Time to blend in from the measured pose [s].")
     ] = 0.5,
     ramp_out: Annotated[float, typer.Option(min=0.01, max=10.0, help="Shortest braking time [s].")] = 0.2,
     acknowledge: Annotated[
-        Acknowledge, typer.Option(help="What clears a stop of the robot's own: its restart, or SIGUSR1 only.")
+        Acknowledge, typer.Option(help="What clears a stop by the robot: restart, or SIGUSR1.")
     ] = Acknowledge.robot,
     real_time: Annotated[
         bool, typer.Option("--real-time/--no-real-time", help="Request SCHED_FIFO and locked memory.")
@@ -89,19 +85,17 @@ def stream(
     priority: Annotated[int, typer.Option(min=1, max=98, help="Priority under SCHED_FIFO.")] = 80,
     watchdog: Annotated[
         float,
-        typer.Option(
-            min=0.0, max=10.0, help="Age of the heartbeat at which the watchdog requests a stop [s]; 0: no watchdog."
-        ),
+        typer.Option(min=0.0, max=10.0, help="Heartbeat age at which a stop is requested [s]; 0: none."),
     ] = 0.1,
     log: Annotated[
         Path | None, typer.Option(help="Log of the references, .csv or .qpref.", callback=output_file(".csv", ".qpref"))
     ] = None,
-    web: Annotated[bool, typer.Option("--web", help="Show it in the browser; nothing comes back from there.")] = False,
-    web_host: Annotated[str, typer.Option(help="Address of the page; any but this computer's own needs a token.")] = (
-        "127.0.0.1"
-    ),
+    web: Annotated[bool, typer.Option("--web", help="Show the stream in the browser; the page is read-only.")] = False,
+    web_host: Annotated[
+        str, typer.Option(help="Address of the page; any but this computer's own requires a token.")
+    ] = ("127.0.0.1"),
     web_port: Annotated[int, typer.Option(min=0, max=65535, help="Its port.")] = 8080,
-    web_token: Annotated[str | None, typer.Option(help="Whoever opens it must know; made up where needed.")] = None,
+    web_token: Annotated[str | None, typer.Option(help="Token that the page asks for; generated where needed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the report as JSON to standard output.")] = False,
 ) -> None:
     """Stream joint references to an IRC5 at its own pace (250 Hz). Ctrl-C ramps out before leaving.

@@ -35,17 +35,17 @@ def web(
     story: Annotated[
         Path | None, typer.Option(help="TOML file of a story: people who come besides the dragged one.")
     ] = None,
-    host: Annotated[str, typer.Option(help="Address to serve at; any but this computer's own needs a token.")] = (
+    host: Annotated[str, typer.Option(help="Address to serve at; any but this computer's own requires a token.")] = (
         "127.0.0.1"
     ),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0 for any free one.")] = 8080,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 for any free one.")] = 8080,
     token: Annotated[
-        str | None, typer.Option(help="Whoever opens the page must know it; made up where it is needed.")
+        str | None, typer.Option(help="Token that the page asks for; generated where one is needed.")
     ] = None,
-    dark: Annotated[bool, typer.Option("--dark", help="A dark page.")] = False,
+    dark: Annotated[bool, typer.Option("--dark", help="Use a dark theme.")] = False,
     shadows: Annotated[bool, typer.Option(help="Draw shadows, which is slow without a graphics card.")] = True,
-    open_: Annotated[bool, typer.Option("--open", help="Open it in this computer's browser.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for what is recorded.", callback=output_folder)] = Path("out/web"),
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in this computer's browser.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for recordings.", callback=output_folder)] = Path("out/web"),
 ) -> None:
     """Watch and play in the browser: drag a person towards the robot, change law and parameters, record.
 
