@@ -114,7 +114,7 @@ WITH_SIM = {
     "gym": "import qpsafe.sim.campaign.gym.environment",
     "dask": "from qpsafe.sim.campaign.executors import dask_executor; dask_executor('tcp://127.0.0.1:1').__enter__()",
 }
-TOGETHER = {"test", "dev", "bench", "release"}  # for who works on the project
+TOGETHER = {"test", "dev", "bench", "browser", "docs", "release"}  # for who works on the project
 
 ARM = """<robot name="arm"><link name="base"/>{links}{joints}</robot>"""
 

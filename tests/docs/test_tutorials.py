@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import socket
 import subprocess
 import sys
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,6 +50,18 @@ def matches(expected: str, printed: str) -> bool:
     )
 
 
+@cache
+def ports() -> dict[str, list[str]]:
+    """Options that give the wire ports of its own: others may stream on this computer."""
+    with ExitStack() as held:
+        sockets = [held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(3)]
+        for one in sockets:
+            one.bind(("127.0.0.1", 0))
+        robot, sensors, events = (str(one.getsockname()[1]) for one in sockets)
+    both = ["--port", robot, "--sensor-port", sensors]
+    return {"stream": [*both, "--events", f"127.0.0.1:{events}"], "irc5-sim": [*both, "--event-port", events]}
+
+
 def run(command: str, folder: Path, started: list[subprocess.Popen[bytes]]) -> str:
     """What a command line prints to standard output; it has to end well.
 
@@ -57,8 +72,10 @@ def run(command: str, folder: Path, started: list[subprocess.Popen[bytes]]) -> s
     """
     words = shlex.split(command, comments=True)
     program = {"python": [sys.executable], "qpsafe": [sys.executable, "-c", QPSAFE]}[words[0]]
-    if words[-1] == "&":
-        started.append(subprocess.Popen([*program, *words[1:-1]], cwd=folder, stdout=subprocess.DEVNULL))
+    beside = words[-1] == "&"
+    words = [*words[: -1 if beside else None], *ports().get(words[1], [])]
+    if beside:
+        started.append(subprocess.Popen([*program, *words[1:]], cwd=folder, stdout=subprocess.DEVNULL))
         return ""
     done = subprocess.run(
         [*program, *words[1:]],
