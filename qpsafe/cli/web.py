@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import console
+from qpsafe.cli.common import console, print_json
 from qpsafe.cli.outputs import output_folder
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def web(
     shadows: Annotated[bool, typer.Option(help="Draw shadows, which is slow without a graphics card.")] = True,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in this computer's browser.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for recordings.", callback=output_folder)] = Path("out/web"),
+    json: Annotated[bool, typer.Option("--json", help="Write the address as JSON to standard output.")] = False,
 ) -> None:
     """Watch and play in the browser: drag a person towards the robot, change law and parameters, record.
 
@@ -58,7 +60,7 @@ def web(
 
     need_viser()
     check_port(host, port)
-    screen = console(False)
+    screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.web.app import TITLE, App
     from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
@@ -71,6 +73,9 @@ def web(
         app = App(setup, page, out, Looks(dark, shadows))
         try:
             announce(screen, host, page.address)
+            if json:
+                print_json({"address": page.address})
+                sys.stdout.flush()
             if open_:
                 with suppress(webbrowser.Error):
                     webbrowser.open(page.address)
