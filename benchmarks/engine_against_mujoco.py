@@ -1,6 +1,6 @@
 """Random encounters through the campaign's engine and through MuJoCo, compared tick by tick; writes JSON.
 
-    python benchmarks/engine_against_mujoco.py --trials 200 --out docs/data/engine.json
+    python benchmarks/engine_against_mujoco.py --trials 200 --controller strict --out docs/data/engine.json
 
 Up to the first reading that one of the two has and the other has not (a ray that grazes an edge), joint references are
 compared; readings where both hit, and distances where robot and people are apart, are compared at every tick up to
@@ -73,11 +73,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=200)
     parser.add_argument("--dynamics", action="store_true", help="move the reference's robot by torques")
+    parser.add_argument("--controller", default="default", help="of both, by name")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("engine.json"))
     given = parser.parse_args()
     with ProcessPoolExecutor(given.workers) as pool:
-        rows = list(pool.map(partial(compared, dynamics=given.dynamics), range(given.trials), chunksize=4))
+        rows = list(
+            pool.map(
+                partial(compared, dynamics=given.dynamics, controller=given.controller),
+                range(given.trials),
+                chunksize=4,
+            )
+        )
     if given.dynamics:
         contacts = {"both": 0, "engine": 0, "mujoco": 0}
         for row in rows:
