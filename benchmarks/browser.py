@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import shutil
@@ -29,7 +30,11 @@ FLAGS = [
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = {"width": 760, "height": 620}  # little of the scene: it is drawn by software
 WIDE = {"width": 1180, "height": 640}
-WARM = 15.0  # until viser has found a resolution that software can draw [s]
+COARSE = 0.25  # resolution that software draws in no time
+#: Remembers when the mouse has moved last, by the clock of the day [s].
+NOTE = """() => window.addEventListener("pointermove", event => {
+    window.moved = 1e-3 * (performance.timeOrigin + event.timeStamp) }, true)"""
+WARM = 5.0  # until all has been drawn once [s]
 QUIET = 0.3  # without news a drag is over, what viser holds back included [s]
 READY = 90.0  # to load, to compile if need be, and to be drawn by a busy machine [s]
 
@@ -59,15 +64,18 @@ class Tab:
         browser: Chromium.
         address: What is opened.
         size: Width and height [px].
+        resolution: Pixels that are drawn of the scene, per pixel of the screen and direction.
     """
 
-    def __init__(self, browser: Any, address: str, size: dict[str, int] | None = None) -> None:
+    def __init__(
+        self, browser: Any, address: str, size: dict[str, int] | None = None, resolution: float = COARSE
+    ) -> None:
         self.complaints: list[str] = []
         self.page = browser.new_page(viewport=size or SIZE)
         self.page.set_default_timeout(1e3 * READY)
         self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(address)
+        self.page.goto(address + ("&" if "?" in address else "?") + f"fixedDpr={resolution:g}")
         self.page.wait_for_selector("#qp-distance", timeout=1e3 * READY)
 
     def text(self, key: str) -> str:
@@ -108,7 +116,7 @@ class Tab:
         mouse = self.page.mouse
         here, there = self.at(start), self.at(end)
         mouse.move(*here)
-        self.page.wait_for_timeout(400)  # until the arrow knows of the mouse
+        self.page.wait_for_timeout(1500)  # until the arrow knows of the mouse
         mouse.down()
         for k in range(1, steps + 1):
             mouse.move(*(a + (b - a) * k / steps for a, b in zip(here, there, strict=True)))
@@ -122,7 +130,8 @@ class Tab:
     def drag_delays(
         self, start: tuple[float, float, float], end: tuple[float, float, float], count: int
     ) -> list[float]:
-        """Times from before a move of the mouse to the end of the first tick that counted with it [s]; single moves."""
+        """Times from when Chromium got a move of the mouse to the end of the first tick that counted with it [s]."""
+        self.page.evaluate(NOTE)
         mouse, delays = self.page.mouse, []
         here, there = np.array(self.at(start)), np.array(self.at(end))
         mouse.move(*here)
@@ -130,10 +139,10 @@ class Tab:
         mouse.down()
         for k in range(1, count + 2):
             known = self.quiet_wish()
-            before = time.monotonic()
             mouse.move(*(here + (there - here) * k / (count + 1)))
             self.until(lambda known=known: self.wish() > known)  # type: ignore[misc]
-            delays.append(float(self.text("qp-wish").split()[1]) - before)
+            moved = float(self.page.evaluate("() => window.moved")) - (time.time() - time.monotonic())
+            delays.append(float(self.text("qp-wish").split()[1]) - moved)
         mouse.up()
         return delays[1:]  # the first one began the drag
 
@@ -178,6 +187,7 @@ class Program:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", code, *words], cwd=folder, env=environment, stdout=said, stderr=said
             )
+        atexit.register(self.process.kill)
         self.address, end = "", time.monotonic() + READY
         while serves and (found := re.search(r"http://\S+", self.said)) is None:
             assert self.process.poll() is None, self.said

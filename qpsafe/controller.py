@@ -203,7 +203,7 @@ class SafetyController(Running):
             explained = seen.capped or not min(activations) >= 1.0 or capped
             still = float(np.abs(qd0).max()) < CALM
             watched = self._tasks, self._law, recovery, commanded, self._qd
-            stall.watch(self._seq, *watched, explained, still, lambda: self._near(commanded))
+            stall.watch(self._seq, *watched, explained, still, near=lambda: self._near(commanded))
         samples = recovery.update(cdf_n, commanded, activations)
         tasks, active, law = self._tasks, activations, self._law
         if recovery.way is not None:  # back through the joints

@@ -149,7 +149,12 @@ def stream(
         dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None
         if requests.leave:
             raise typer.Exit(130)
-        watch = _watch(robot, experiment, (web_host, web_port, web_token), screen) if web else None
+        watch: Watch | None = None
+        if web:
+            from qpsafe.cli.web import watch_stream
+
+            shown = None if experiment is None else experiment.value
+            watch = watch_stream(robot, shown, (web_host, web_port, web_token), screen)
         if watch is not None:  # begun before anything is asked for that it would inherit
             stack.callback(watch.close)
         grants += _grants(real_time, priority, [spoken.thread, written.thread])
@@ -192,24 +197,6 @@ def stream(
             spoken.write("qpsafe: the report could not be written as a whole\n")
         if not (spoken.close() and written.close() and result["good"]):
             raise typer.Exit(1)
-
-
-def _watch(
-    robot: str, experiment: Experiment | None, at: tuple[str, int, str | None], screen: Any
-) -> Watch:  # fmt: skip
-    """The page, which only reads; waits until it answers, so that a browser may be opened before the robot moves."""
-    from qpsafe.cli.web import announce
-    from qpsafe.sim.web.server import address_of, token_for
-    from qpsafe.sim.web.watch import Watch
-
-    host, port, token = at
-    token = token_for(host, token)
-    watch = Watch(robot, None if experiment is None else experiment.value, host, port, token)
-    if watch.wait():
-        announce(screen, host, address_of(host, port, token))
-    else:
-        screen.print("no page: its process does not answer", style="yellow")
-    return watch
 
 
 def _writer(path: Path, joints: int) -> ReferenceWriter:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -12,11 +13,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import console
+from qpsafe.cli.common import console, print_json
 from qpsafe.cli.outputs import output_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from qpsafe.sim.web.watch import Watch
 
 LOCAL_WARNING = (
     "WARNING: everybody who reaches {host} and knows the token can use this page; nothing on the way is encrypted"
@@ -44,6 +47,7 @@ def web(
     shadows: Annotated[bool, typer.Option(help="Draw shadows, which is slow without a graphics card.")] = True,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in this computer's browser.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for recordings.", callback=output_folder)] = Path("out/web"),
+    json: Annotated[bool, typer.Option("--json", help="Write the address as JSON to standard output.")] = False,
 ) -> None:
     """Watch and play in the browser: drag a person towards the robot, change law and parameters, record.
 
@@ -56,7 +60,7 @@ def web(
 
     need_viser()
     check_port(host, port)
-    screen = console(False)
+    screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.web.app import TITLE, App
     from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
@@ -69,6 +73,9 @@ def web(
         app = App(setup, page, out, Looks(dark, shadows))
         try:
             announce(screen, host, page.address)
+            if json:
+                print_json({"address": page.address})
+                sys.stdout.flush()
             if open_:
                 with suppress(webbrowser.Error):
                     webbrowser.open(page.address)
@@ -116,3 +123,25 @@ def announce(screen: Console, host: str, address: str) -> None:
     if host not in LOCAL:
         screen.print(LOCAL_WARNING.format(host=host), style="bold yellow")
     screen.print(f"open {address} in a browser; Ctrl-C ends it", soft_wrap=True)
+
+
+def watch_stream(robot: str, experiment: str | None, at: tuple[str, int, str | None], screen: Console) -> Watch:
+    """The page of a stream, which only reads; waits until it answers: a browser may be opened before the robot moves.
+
+    Args:
+        robot: Name or path.
+        experiment: That is streamed, for its scene.
+        at: Host, port and token, if there is one.
+        screen: Where its address is said.
+    """
+    from qpsafe.sim.web.server import address_of, token_for
+    from qpsafe.sim.web.watch import Watch
+
+    host, port, token = at
+    token = token_for(host, token)
+    watch = Watch(robot, experiment, host, port, token)
+    if watch.wait():
+        announce(screen, host, address_of(host, port, token))
+    else:
+        screen.print("no page: its process does not answer", style="yellow")
+    return watch

@@ -139,7 +139,7 @@ class StallWatch:
 
     def watch(
         self, tick: int, tasks: Sequence[Task], law: Law, recovery: Recovery, state: RobotState,
-        qd: NDArray[np.float64], explained: bool, calm: bool, near: Near = nothing_near,
+        qd: NDArray[np.float64], explained: bool, calm: bool, *, near: Near = nothing_near,
     ) -> None:  # fmt: skip
         """See whether the robot does not get on, with nothing to explain it; lead it back another way if need be.
 

@@ -57,6 +57,7 @@ def test_the_outputs_are_those_of_all_commands() -> None:
             ("add", "out"),
             ("story", "plot"),
             ("replay", "video"),
+            ("web", "out"),
             ("stream", "log"),
             ("irc5-sim", "log"),
         ),
