@@ -112,6 +112,7 @@ WITH_SIM = {
     "place": "from qpsafe.placement.surface import _trimesh; _trimesh('a mesh')",
     "campaign": "from qpsafe.sim.campaign.store import _pyarrow; _pyarrow()",
     "gym": "import qpsafe.sim.campaign.gym.environment",
+    "web": "from qpsafe.sim.web.server import need_viser; need_viser()",
     "dask": "from qpsafe.sim.campaign.executors import dask_executor; dask_executor('tcp://127.0.0.1:1').__enter__()",
 }
 TOGETHER = {"test", "dev", "bench", "browser", "docs", "release"}  # for who works on the project
@@ -161,7 +162,4 @@ def test_what_is_missing_is_named_by_its_extra(present: str, asked: dict[str, st
 
 
 def test_every_extra_is_asked_for() -> None:
-    web = set() if (ROOT / "qpsafe" / "cli" / "web.py").exists() else {"web"}
-    assert set(PROJECT["optional-dependencies"]) - TOGETHER - web == {*BARE, *WITH_SIM} | (
-        {"web"} if not web else set()
-    )
+    assert set(PROJECT["optional-dependencies"]) - TOGETHER == {*BARE, *WITH_SIM}

@@ -66,6 +66,7 @@ def web(
     from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
     from qpsafe.sim.web.view import Looks
 
+    robot = ready_robot(robot, screen)
     setup = Setup(robot, HOLD if program is None else str(program), NOBODY if story is None else str(story))
     setup.experiment().start  # noqa: B018  what is wrong is said before anything is served
     page = Page(host, port, TITLE, token_for(host, token))
@@ -85,6 +86,21 @@ def web(
             app.close()
     finally:
         page.close()
+
+
+def ready_robot(name: str, screen: Console) -> str:
+    """Name of a robot that can be shown: a bare file gets a folder with a home posture and sensors, see `any_robot`.
+
+    Args:
+        name: What was typed.
+        screen: Where it is said what was chosen.
+    """
+    from qpsafe.cli.demos.any_robot import any_robot, own_folder
+
+    if not Path(name).is_file():
+        return name
+    any_robot("qpsafe web", name, own_folder(name), screen, joints=4)
+    return str(own_folder(name) / "robot")
 
 
 @contextmanager
