@@ -214,12 +214,14 @@ def main() -> None:
         done = troubles(lambda q, pose, kind=kind: kind(robot, q, pose), given)
         found[name] = {"version": version(package), **done}
     found["mink"]["damped"] = damped(robot, given)
+    from qpsafe.text.json_text import json_text
+
     if python:
         script = Path(__file__).with_name("peers_placo.py")
-        done = subprocess.run([python, script], input=json.dumps(given), capture_output=True, text=True, check=True)
+        done = subprocess.run([python, script], input=json_text(given), capture_output=True, text=True, check=True)
         found["placo"] = json.loads(done.stdout.splitlines()[-1])
-    FILE.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    print(json.dumps(found, indent=1, sort_keys=True))
+    FILE.write_text(json_text(found) + "\n", encoding="utf-8")
+    print(json_text(found))
 
 
 if __name__ == "__main__":

@@ -85,4 +85,4 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "robot.urdf").write_text(given["urdf"], encoding="utf-8")
         found = troubles(lambda q, pose: Placo(folder + "/", q, pose), given)
-    print(json.dumps({"version": version("placo"), **found}))
+    print(json.JSONEncoder(allow_nan=False).encode({"version": version("placo"), **found}))

@@ -33,7 +33,7 @@ from qpsafe.compiled.memory import view
 from qpsafe.danger.evasion import filter_by
 from qpsafe.gate import gate_kernel
 from qpsafe.gate.braking_path import slow_down
-from qpsafe.gate.gate_kernel import SHORT, let_through
+from qpsafe.gate.gate_kernel import SHORT, WORTH_SAYING, let_through
 from qpsafe.pipeline.resolve_kernel import given
 from qpsafe.pipeline.sense_kernel import (
     ENDS as WIRE_ENDS,
@@ -89,7 +89,7 @@ def _plan(
             p.gate, p.gate_whole, s.gate_known, w.gate, w.gate_whole, s.q, s.qd, w.command,
             view(w.points, 0, (s.marks[code.COUNT], 3)), ages, s.gated,
         )  # fmt: skip
-        if s.gated[SHORT] > 0.0:
+        if s.gated[SHORT] > WORTH_SAYING:
             notes |= code.TOO_NEAR
     watch_units(p, s, spots[1], distances, points, how == code.POINTS)
     if how == code.DISTANCES and (s.marks[code.OUT] > 0 or s.marks[code.STOPPED] == 1):

@@ -28,6 +28,7 @@ NOTHING, PERSON_NEAR, SOLID_NEAR = 0, 1, 2
 #: `told` of a call: the share λ; what held it back; capsule or group; point or pair; what braking is short of [m].
 SHARE, CAUSE, WHO, POINT, SHORT = range(5)
 TOLD = 5
+WORTH_SAYING = 1e-3  # that braking is short of, well within the error of a seen point [m]
 
 USES = (
     reference_module, tables, workspace, braking_path, people_kernel, solids_kernel, kinematics, pairs_module,

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from qpsafe.gate.gate_kernel import WORTH_SAYING
+
 #: What a tick says where its command is not verified.
 TOO_NEAR = "a link that could touch somebody moves towards them faster than allowed, though it brakes: seen too late"
 
@@ -37,8 +39,8 @@ class Gated(NamedTuple):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences for the tick's messages."""
-        return () if self.verified else (TOO_NEAR,)
+        """Sentences for the tick's messages: where braking is short of more than 1 mm."""
+        return (TOO_NEAR,) if self.short > WORTH_SAYING else ()
 
     def __str__(self) -> str:
         if not self.cause:

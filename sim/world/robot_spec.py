@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from qpsafe.robot.mjcf import held_positions
 from qpsafe.robot.mujoco_spec import mujoco_spec
 from qpsafe.sim.world.tool_axis import tool_axis, turned_to
-from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -167,7 +166,7 @@ def _add_excludes(spec: Any, robot: Robot) -> list[str]:
         spec.add_exclude(bodyname1=one, bodyname2=other)
     if not pairs:
         return []
-    return [f"{counted(len(pairs), 'pair')} of bodies that touch at home may: " + ", ".join(map(" and ".join, pairs))]
+    return ["bodies that touch at home may: " + ", ".join(map(" and ".join, pairs))]
 
 
 def shown_groups(model: Any) -> NDArray[np.uint8]:

@@ -19,6 +19,7 @@ from qpsafe.robot.starting_file import starting_robot_toml
 from qpsafe.sim.experiments.shared.home import Arm, chosen_home
 from qpsafe.sim.experiments.shared.skin import skin_toml
 from qpsafe.sim.world.robot_spec import UNSTATED, torques
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -118,8 +119,9 @@ def check_arm(where: str, robot: Robot, joints: int) -> None:
     """
     arm = Arm.of(robot)
     if len(arm.joints) < joints:
-        found = f"{robot.name}, {arm.tool} on {len(arm.joints)} joints"
-        raise ConfigurationError(where, "--robot", found, f"an arm with {joints} joints or more between base and tool")
+        found = f"{robot.name}, {arm.tool} on {counted(len(arm.joints), 'joint')}"
+        wanted = f"an arm with {counted(joints, 'joint')} or more between base and tool"
+        raise ConfigurationError(where, "--robot", found, wanted)
     if not (np.isfinite(arm.length) and 0.15 < arm.length <= MOST):
         found = f"{robot.name}, an arm of {arm.length:.2f} m"
         raise ConfigurationError(
