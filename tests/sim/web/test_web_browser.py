@@ -213,7 +213,7 @@ def test_a_stream_is_shown_and_has_nothing_to_be_changed(tab: Open, program: Sta
     ports = ["--port", robot, "--sensor-port", sensors]
     words = ["--experiment", "fixed", "--events", "", "--web", "--web-port", free_port()]
     serving = program("stream", *words, *ports)
-    simulated = Program(["irc5-sim", *ports], tmp_path, serves=False)
+    simulated = Program(["irc5-sim", "--event-port", "0", *ports], tmp_path, serves=False)
     try:
         shown = tab(serving.address)
         at = shown.number("qp-time")
