@@ -202,7 +202,6 @@ def test_a_drag_reaches_the_robot(tab: Open, program: Start) -> None:
     assert median < 1.0
 
 
-
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> str:
     """A port that nobody listens at."""
     with socket.socket(type=kind) as probe:
