@@ -21,7 +21,7 @@ test: $(VENV)/.dev
 	$(BIN)/python -m pytest $(SHARED) -m "not slow and not web"
 
 test-web: $(VENV)/.browser ## the page in a real browser: Chromium, where it is installed
-	$(BIN)/python -m pytest -m web -p no:xdist tests/sim/web $(AGAIN)
+	$(BIN)/python -m pytest -m web -p no:xdist tests/sim/web
 
 test-slow: $(VENV)/.dev
 	$(BIN)/python -m pytest $(SHARED) -m "not web"

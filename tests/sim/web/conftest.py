@@ -10,9 +10,9 @@ import pytest
 from browser import NAMES, SIZE, Program, Tab, chromium, launched
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def browser() -> Iterator[Any]:
-    """Chromium."""
+    """Chromium, a new one for each test: what one of them did to it does not matter to the next."""
     path = chromium()
     if path is None:
         pytest.skip(f"no Chromium here (looked for {', '.join(NAMES)})")

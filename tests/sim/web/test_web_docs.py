@@ -17,6 +17,7 @@ def test_the_numbers_of_the_page_are_those_that_were_measured() -> None:
         assert f"| {name} | " + " | ".join(f"{1e3 * seconds:.2f} ms" for seconds in times) + " |" in page
     said = " ".join(page.split())
     assert f"it took {1e3 * measured['drag']['median']:.0f} ms in the median" in said
+    assert f"{1e3 * measured['drag']['p90']:.0f} ms in nine of ten cases" in said
     assert f"{measured['seconds']:.0f} s each" in said
     assert f"(load {measured['load']:.0f})" in said
     assert measured["fifo"] is True
