@@ -36,12 +36,14 @@ class ClearanceLimit(Fixed):
     nᵀ J q̇. Its row is nᵀ J q̇ <= the lower of two bounds, with s = d - margin:
 
         (1)  the exact discrete `stopping_speed` of s at the deceleration Σ_j |nᵀ J|_j a_j
-        (2)  nᵀ J q̇_now + (s - w) / T,   w the farthest way along n while all joints brake, T the time until there
+        (2)  nᵀ J q̇_now + W⁻¹(s - w),   w the farthest way along n while all joints brake, W(δ) the most that a speed
+             of approach that is higher by δ leads farther, whichever joints add it (see `clearance_kernel`)
 
     (1) says that the pair can be stopped in time when all joints go against the row together. That alone promises
     nothing: a joint near its own limits cannot, and a robot that brakes does not, since each joint then stops at its
     own a_j in its own time. (2) says that it stops in time when it brakes: where w has reached s, nothing may be added.
-    With one joint in motion (2) is the stricter one, and that of the joint alone.
+    With one joint in motion (2) is the stricter one, and that of the joint alone. Both are continuous: rounding never
+    decides how fast the robot may go.
 
     Both see, to second order, that points move on bent ways while joints turn (`qpsafe.geometry.reach.bending`).
 

@@ -6,11 +6,19 @@ g·q̇ <= the lower of two bounds, with s = d - margin. The first is that of a j
     (1)  stopping_speed(s) at the deceleration Σ_j |g_j| a_j,
 
 which the joints have together if all go against the row, less what `bending` takes of it. The second looks at the
-robot braking, each joint at its own limit: after m ticks of that joint j has covered φ_j(m), the `braking_way` from
-its velocity now, and the pair has come nearer by w = Σ_j g_j φ_j(m) + `bending`, most after m* ticks. A speed of
-approach that is higher by δ leads farther by (m* + 1) dt δ at most while the joints that give it brake, so
+robot braking, each joint at its own limit: after the time t joint j has covered φ_j(t), the `braking_way` from its
+velocity now, and the pair has come nearer by w = max_t Σ_j g_j φ_j(t) + `bending`. In one tick joint j can add |g_j|
+a_j dt at most to the speed of approach, and what it adds leads farther by T_j times that until it stands again,
 
-    (2)  g·q̇_now + (s - max_m w) / ((m* + 1) dt).
+    T_j = dt max(|u_j / (a_j dt) + 1/2| + 1/2, 1),     u_j = q̇_j in the direction in which j approaches,
+
+the exact chord of φ_j over that change. Whichever joints add it, a speed of approach that is higher by δ leads farther
+by W(δ) at most: those with the largest T_j first, each as much as it can. So
+
+    (2)  g·q̇_now + W⁻¹(s - w),
+
+which nothing breaks where s - w >= W of all that can be added; below 0 it is (s - w) / T, T the mean of the T_j as the
+joints can add. Both bounds are continuous in position, velocity and distance: no rounding decides between two of them.
 """
 
 from __future__ import annotations
@@ -32,7 +40,7 @@ from qpsafe.geometry.clearance_work import MOST, cut_rows
 from qpsafe.geometry.layout import BALL, BODY, FLOATS, INTEGERS, SPHERE, VERTEX
 from qpsafe.geometry.nearness import apart, cut_tables, shape_pose
 from qpsafe.geometry.pairs import measured
-from qpsafe.geometry.reach import along_normal, bending, passes, prepare, reach
+from qpsafe.geometry.reach import LOOKS, along_normal, bending, passes, prepare, reach
 from qpsafe.geometry.separation import WORK
 from qpsafe.geometry.support import support
 from qpsafe.limits import stopping_speed
@@ -59,6 +67,33 @@ def highest(s: float, push: float, dt: float) -> float:
 
 
 @inline
+def _added(r: Any, qd: Array, push: float, room: float, dt: float) -> float:
+    """W⁻¹ of a way: what the row's speed may be higher by in the next tick [m/s]."""
+    whole = 0.0
+    for j in range(qd.shape[0]):
+        approach = qd[j] if r.g[j] >= 0.0 else -qd[j]
+        r.times[j] = dt * max(abs(approach / r.steps[j] + 0.5) + 0.5, 1.0)
+        whole += abs(r.g[j]) * r.steps[j] * r.times[j]
+    if room >= whole:
+        return inf
+    if room <= 0.0:
+        return room * push / whole
+    added = 0.0
+    for _ in range(qd.shape[0]):  # the longest that is left
+        at = 0
+        for j in range(1, qd.shape[0]):
+            if r.times[j] > r.times[at]:
+                at = j
+        most = abs(r.g[at]) * r.steps[at]
+        if most * r.times[at] >= room:
+            return added + room / r.times[at]
+        added += most
+        room -= most * r.times[at]
+        r.times[at] = 0.0
+    return added
+
+
+@inline
 def _bound(
     t: Any, r: Any, twists: Array, qd: Array, a: int, b: int, p: Vector, o: Vector, n: Vector, s: float, dt: float
 ) -> tuple[float, float]:
@@ -77,17 +112,16 @@ def _bound(
         most += abs(g) * (r.far[j] if g * qd[j] >= 0.0 else r.back[j])
     if most <= s:
         return inf, inf
-    way, ticks, back = -inf, 1.0, (-n[0], -n[1], -n[2])
-    for i in range(r.times.shape[0]):
+    way, back = -inf, (-n[0], -n[1], -n[2])
+    for i in range(LOOKS):
         covered = 0.0
         for j in range(qd.shape[0]):
             covered += r.g[j] * r.ahead[i, j]
         covered += bending(t, twists, r.ahead[i], a, b, p, o, n) + bending(t, twists, r.ahead[i], b, a, o, p, back)
-        if covered > way:
-            way, ticks = covered, r.times[i]
+        way = max(way, covered)
     # what bends towards the other takes of the deceleration
     bent = 2.0 * dt * (bending(t, twists, qd, a, b, p, o, n) + bending(t, twists, qd, b, a, o, p, back))
-    bound = min(highest(s, max(push - bent, 0.2 * push), dt), speed + (s - way) / ((ticks + 1.0) * dt))
+    bound = min(highest(s, max(push - bent, 0.2 * push), dt), speed + _added(r, qd, push, s - way, dt))
     return max(bound, -RETURN_SPEED), bound - speed - push
 
 

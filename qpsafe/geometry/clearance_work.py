@@ -21,8 +21,8 @@ class Rows(NamedTuple):
     """What a tick's rows are made of, and the rows.
 
     Attributes:
-        ahead: Way of each joint when all brake, after some ticks, with its sign (LOOKS, n).
-        times: After how many (LOOKS,).
+        ahead: Way of each joint when all brake, after some time, with its sign (LOOKS, n).
+        times: How long what a joint adds leads on (n,) [s].
         far: Way of each joint that it can cover at most (n,).
         back: Likewise the other way than it goes now (n,).
         steps: a dt (n,) [rad/s].
@@ -63,14 +63,14 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
         n: Joints.
         g: Shapes.
     """
-    a = LOOKS * (n + 1)
+    a = (LOOKS + 1) * n
     b = a + 3 * n + (n + 1) * n
     c = b + 3 * (n + 1) + 3 * g
     d = c + 2 * (24 + 12 + WORK + 7) + FLOATS
     e = d + n + MOST
     return Rows(
         view(floats, 0, (LOOKS, n)),
-        view(floats, LOOKS * n, (LOOKS,)),
+        view(floats, LOOKS * n, (n,)),
         view(floats, a, (n,)),
         view(floats, a + n, (n,)),
         view(floats, a + 2 * n, (n,)),
@@ -90,7 +90,7 @@ def rows_of(floats: Any, integers: Any, n: int, g: int) -> Rows:
 
 def sizes_of(n: int, g: int) -> tuple[int, int]:
     """How many floats and integers these are, for n joints and g shapes."""
-    floats = LOOKS * (n + 1) + 3 * n + (n + 1) * n + 3 * (n + 1) + 3 * g + 2 * (43 + WORK) + FLOATS + n + MOST * (n + 3)
+    floats = (LOOKS + 4) * n + (n + 1) * n + 3 * (n + 1) + 3 * g + 2 * (43 + WORK) + FLOATS + n + MOST * (n + 3)
     return floats, MOST + 2
 
 

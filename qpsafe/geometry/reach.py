@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, floor, inf, sqrt
+from math import floor, inf, sqrt
 from typing import Any
 
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, inline
@@ -17,11 +17,12 @@ LOOKS = 8  # times at which the way of a braking robot is looked at, the last on
 def braking_way(v: float, a: float, dt: float, ticks: float) -> float:
     """How far a speed v >= 0 leads in some ticks that is held for the first one and then reduced by a dt each tick.
 
-    dt Σ_{j=0..m-1} (v - j a dt), m being the ticks, or those until it stands: k + 1 with k = floor(v/(a dt)). With all
-    of these it is the inverse of `stopping_speed`.
+    dt Σ_{j=0..m-1} (v - j a dt), m being the whole ticks, or those until it stands: k + 1 with k = floor(v/(a dt)); and
+    of the tick that has begun its part. Continuous in v and ticks. With all ticks the inverse of `stopping_speed`.
     """
-    m = min(ticks, floor(v / (a * dt)) + 1.0)
-    return dt * m * (v - 0.5 * a * dt * (m - 1.0))
+    whole = floor(min(ticks, floor(v / (a * dt)) + 1.0))
+    rest = min(ticks - whole, 1.0) * max(v - whole * a * dt, 0.0)
+    return dt * (whole * (v - 0.5 * a * dt * (whole - 1.0)) + rest)
 
 
 @inline
@@ -32,11 +33,10 @@ def prepare(t: Any, r: Any, poses: Array, twists: Array, qd: Array, limits: Arra
         v, a = abs(qd[j]), limits[3, j]
         r.steps[j] = step = a * dt
         r.far[j], r.back[j] = braking_way(v + step, a, dt, inf), max(step - v, 0.0) * dt
-        last = max(last, floor(v / step) + 1.0)
+        last = max(last, v / step + 1.0)
     for i in range(LOOKS):
-        r.times[i] = ceil((i + 1) * last / LOOKS)
         for j in range(n):
-            way = braking_way(abs(qd[j]), limits[3, j], dt, r.times[i])
+            way = braking_way(abs(qd[j]), limits[3, j], dt, (i + 1) * last / LOOKS)
             r.ahead[i, j] = way if qd[j] >= 0.0 else -way
     for b in range(1, n + 1):
         c = place(poses[b], t.balls[b, 0], t.balls[b, 1], t.balls[b, 2])

@@ -161,6 +161,43 @@ def test_shapes_that_overlap_are_led_apart(made: Any) -> None:
     assert after > before + 0.01
 
 
+def test_rounding_does_not_decide_what_a_row_allows(made: Any) -> None:
+    """Speeds that are whole ticks of braking, joints that stand, ways that are as far after many times: where what is
+    chosen from a list would jump."""
+    robot, solids = made
+    limit, limits = ClearanceLimit(robot, solids, margin=0.02), JointLimits.of(robot)
+    rng, steps, compared = np.random.default_rng(5), robot.max_acceleration * limits.dt, 0
+    for _ in range(150):
+        q = robot.home + rng.uniform(-0.7, 0.7, robot.nq)
+        qd = steps * rng.integers(-8, 9, robot.nq) * rng.integers(0, 2, robot.nq)
+        rows = limit.level(robot.at(q), qd, limits)
+        if rows is None:
+            continue
+        near = limit.level(robot.at(q), qd + 1e-15 * rng.uniform(-1.0, 1.0, robot.nq), limits)
+        assert near is not None
+        for k, (pair, gap) in enumerate(zip(rows.pairs, rows.gaps, strict=True)):
+            if gap < 1e-6:
+                continue
+            same = [
+                j for j, other in enumerate(near.pairs) if other == pair and np.allclose(near.A[j], rows.A[k], 0, 1e-9)
+            ]
+            assert same, (pair, gap)
+            assert np.abs(near.upper[same] - rows.upper[k]).min() < 1e-9
+            compared += 1
+    assert compared > 30
+
+
+@given(st.floats(0.0, 5.0), st.floats(0.01, 100.0), st.floats(0.0, 200.0))
+def test_the_way_of_braking_does_not_jump(v: float, a: float, ticks: float) -> None:
+    way, dt = braking_way.py_func, 0.004
+    for tick in (ticks, np.floor(ticks)):
+        for speed in (v, np.floor(v / (a * dt)) * a * dt):
+            here = way(speed, a, dt, tick)
+            most = 1e-9 * (speed * dt + dt * tick)
+            assert way(speed, a, dt, tick + 1e-9) == pytest.approx(here, abs=2.0 * most + 1e-12)
+            assert way(speed + 1e-9, a, dt, tick) == pytest.approx(here, abs=2.0 * most + 1e-12)
+
+
 @pytest.mark.parametrize("margin", [-0.001, np.nan, np.inf, "wide"])
 def test_a_margin_that_is_none_is_refused(made: Any, margin: Any) -> None:
     robot, solids = made
