@@ -37,7 +37,7 @@ class ClearanceLimit(Fixed):
 
         (1)  the exact discrete `stopping_speed` of s at the deceleration Σ_j |nᵀ J|_j a_j
         (2)  nᵀ J q̇_now + W⁻¹(s - w),   w the farthest way along n while all joints brake, W(δ) the most that a speed
-             of approach that is higher by δ leads farther, whichever joints add it (see `clearance_kernel`)
+             of approach that is higher by δ leads farther, whichever joints add it (see `clearance_bound`)
 
     (1) says that the pair can be stopped in time when all joints go against the row together. That alone promises
     nothing: a joint near its own limits cannot, and a robot that brakes does not, since each joint then stops at its
