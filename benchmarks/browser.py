@@ -37,7 +37,7 @@ NOTE = """() => window.addEventListener("pointermove", event => {
     window.moved = 1e-3 * (performance.timeOrigin + event.timeStamp) }, true)"""
 WARM = 5.0  # until all has been drawn once [s]
 QUIET = 0.3  # without news a drag is over, what viser holds back included [s]
-READY = 90.0  # to load, to compile if need be, and to be drawn by a busy machine [s]
+READY = 300.0  # to load, to compile if need be, and to be drawn, by a machine with much else to do [s]
 
 
 def chromium() -> str | None:
