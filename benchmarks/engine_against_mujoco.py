@@ -1,6 +1,6 @@
 """Random encounters through the campaign's engine and through MuJoCo, compared tick by tick; writes JSON.
 
-    python benchmarks/engine_against_mujoco.py --trials 200 --controller strict --out docs/data/engine.json
+    python benchmarks/engine_against_mujoco.py --trials 200 --out docs/data/engine.json
 
 Up to the first reading that one of the two has and the other has not (a ray that grazes an edge), joint references are
 compared; readings where both hit, and distances where robot and people are apart, are compared at every tick up to
