@@ -71,7 +71,7 @@ class Watch:
         return self._process.pid or 0
 
     def observe(self, tick: Tick | None, q: Array | None, state: str, response: float) -> None:
-        """Tell of a tick; never waits, and never learns whether anybody looks.
+        """Report a tick; never waits, and never learns whether anybody looks.
 
         Args:
             tick: The newest; None before the first.
@@ -107,7 +107,7 @@ class Watch:
         return False
 
     def close(self) -> None:
-        """Say that nothing more comes; the page ends by itself."""
+        """Say that no more frames come; the page's process then ends."""
         self.outbound.close()
         self._process.join(1.0)
         if self._process.is_alive():
@@ -133,10 +133,10 @@ def _serve(reading: Connection, shown: tuple[str, str | None, Path | None], host
 
 
 def show_all(inbound: Inbound, view: Any, page: Any) -> None:
-    """Show what comes until nothing more does.
+    """Show frames until no more arrive.
 
     Args:
-        inbound: Where frames come from.
+        inbound: Where frames arrive.
         view: What shows them.
         page: Whose.
     """
