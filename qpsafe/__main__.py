@@ -1,4 +1,4 @@
-"""`python -m qpsafe`, and the `qpsafe` command: where the extra that it needs is missing, one line says so."""
+"""`python -m qpsafe`, and the `qpsafe` command: one line says which extra is missing, if one is."""
 
 from __future__ import annotations
 

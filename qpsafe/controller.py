@@ -71,10 +71,10 @@ class SafetyController(Running):
         spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
-        carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
+        carried: What tools may carry, keyed by the frame it is fixed to, in that frame's axes: part of the robot.
         barrier: A cap on the danger field, beyond the paper; none by default.
-        gate: Figures of the last step, which lets through the verified part of a command: the default ones for None;
-            "off" sends it as it is. Without limits it is off.
+        gate: Figures of the last step, which lets only the verified part of a command through; None for the default
+            ones, "off" to send commands as they are. Without limits it is off.
         clearance: How near the robot may come to known obstacles, to itself and to what it carries; "off" switches it
             off, and so does `limits="off"`.
         separation: Speed and separation monitoring, above all tasks; none by default.

@@ -16,7 +16,7 @@ class QpsafeError(Exception):
 
 
 def in_words(error: BaseException, kind: bool = True) -> str:
-    """What an error says, with its kind; never raises, whatever a stranger's class does when it is asked.
+    """The message of an error, with the name of its class; never raises, even where a foreign class's own methods do.
 
     Args:
         error: The error.

@@ -1,4 +1,4 @@
-"""What only some uses need, and the named error where it is not installed. A robot's computer needs none of it."""
+"""Optional dependencies, and the named error where one is not installed. A robot's computer needs none of them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from qpsafe.errors import MissingExtraError
 
 
 def require(extra: str, what: str, *modules: str) -> None:
-    """Say at once, and by its extra, what is not installed; nothing is imported.
+    """Raise at once, naming the extra, if a module is not installed; nothing is imported.
 
     Args:
-        extra: Of qpsafe, as in ``pip install 'qpsafe[extra]'``.
-        what: Needs it, to begin the message with.
-        modules: All of these.
+        extra: The extra of qpsafe that installs the modules, as in ``pip install 'qpsafe[extra]'``.
+        what: What needs them; the message begins with it.
+        modules: Names of the modules.
 
     Raises:
         MissingExtraError: Names the first that is missing, and the extra.

@@ -1,4 +1,4 @@
-"""Attributes that are given once. Compiled code keeps copies of them: a change would be ignored, so it is refused."""
+"""Attributes that are set once. Compiled code keeps copies of them: a change would be ignored, so it is refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qpsafe.errors import ConfigurationError
 
 
 class Fixed:
-    """Base of parts that do not change once they are made; whoever wants another number makes another part.
+    """Base class of immutable parts: to change a number, make another part.
 
     Arrays among the attributes become read-only, so they must be the part's own. Methods cannot be replaced on a single
     object either: compiled code would not call them. Reading costs nothing.

@@ -175,7 +175,7 @@ def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, d
         dt: Tick [s].
 
     Raises:
-        ConfigurationError: They do not, in the name of `where`.
+        ConfigurationError: They do not fit; the error names `where`.
     """
     if limits is None or (isinstance(limits, str) and limits == "robot"):
         return JointLimits.of(robot, dt)

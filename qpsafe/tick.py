@@ -114,7 +114,7 @@ class Tick:
 
     @property
     def clearance(self) -> tuple[tuple[str, str, float], ...]:
-        """Pairs of shapes that the command is kept from coming nearer by: their names and distance [m]."""
+        """Pairs of shapes that the command must not bring nearer to each other: their names and distance [m]."""
         levels = () if self.resolved is None else self.resolved.soft
         return tuple(x for rows in levels if isinstance(rows, ClearanceLevel) for x in rows.binding(self.reference.qd))
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
-from pygments.lexers.special import TextLexer
 from sphinx.addnodes import pending_xref, pending_xref_condition
 
 from site_pages import api, commands
@@ -83,6 +82,5 @@ def setup(app: Any) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", on_docstring, priority=BEFORE_NAPOLEON)
     app.connect("doctree-read", on_types)
     app.add_directive("recording", Recording)
-    app.add_lexer("mermaid", TextLexer)
     app.connect("missing-reference", on_missing)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

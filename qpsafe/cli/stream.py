@@ -154,7 +154,7 @@ def stream(
             from qpsafe.cli.web import watch_stream
 
             shown = None if experiment is None else experiment.value
-            watch = watch_stream(robot, shown, (web_host, web_port, web_token), screen)
+            watch = watch_stream(robot, shown, cell, (web_host, web_port, web_token), screen)
         if watch is not None:  # begun before anything is asked for that it would inherit
             stack.callback(watch.close)
         grants += _grants(real_time, priority, [spoken.thread, written.thread])

@@ -141,12 +141,15 @@ def announce(screen: Console, host: str, address: str) -> None:
     screen.print(f"open {address} in a browser; Ctrl-C ends it", soft_wrap=True)
 
 
-def watch_stream(robot: str, experiment: str | None, at: tuple[str, int, str | None], screen: Console) -> Watch:
+def watch_stream(
+    robot: str, experiment: str | None, cell: Path | None, at: tuple[str, int, str | None], screen: Console
+) -> Watch:
     """The page of a stream, which only reads; waits until it answers: a browser may be opened before the robot moves.
 
     Args:
         robot: Name or path.
         experiment: That is streamed, for its scene.
+        cell: File of the furniture, if there is one.
         at: Host, port and token, if there is one.
         screen: Where its address is said.
     """
@@ -155,7 +158,7 @@ def watch_stream(robot: str, experiment: str | None, at: tuple[str, int, str | N
 
     host, port, token = at
     token = token_for(host, token)
-    watch = Watch(robot, experiment, host, port, token)
+    watch = Watch(robot, experiment, cell, host, port, token)
     if watch.wait():
         announce(screen, host, address_of(host, port, token))
     else:

@@ -120,7 +120,7 @@ class SeparationLimit(Fixed):
 def kept_apart(soft: Sequence[Level], command: Array, box: Box | None) -> Array:
     """The velocity nearest to a command that meets the rows of separation, as well as they can be met in the box.
 
-    What a law made under them as soft levels stays as it is; laws that take no notice of such levels need it.
+    The answer of a law that obeys soft levels stays as it is; laws that ignore such levels need this correction.
 
     Args:
         soft: Levels under the joint limits, highest priority first; without rows of separation nothing is done.

@@ -1,4 +1,4 @@
-"""Capsules around a robot's collision hulls: what a person must not be touched by, a little larger than it is.
+"""Capsules around a robot's collision hulls: what must not touch a person, slightly enlarged.
 
 Where the model has no collision geometry, they are those of the robot's wire, without thickness.
 """

@@ -30,7 +30,7 @@ class Gate(Fixed):
     Args:
         robot: The robot.
         rules: Figures.
-        limits: By which it brakes; those of another making by their numbers.
+        limits: Limits by which it brakes; of a class of your own only the numbers count.
         known: Known obstacles of the surroundings.
         carried: What tools may carry, by frame, as for `SafetyController`.
         max_age: Older readings do not count [s].
@@ -53,7 +53,7 @@ class Gate(Fixed):
         self._unsaid = True
 
     def __call__(self, q: Array, qd: Array, command: Array, points: Array, ages: Array) -> Gated:
-        """Replace a command (n,) [rad/s] by what of it can be let through.
+        """Replace a command (n,) [rad/s] by the part of it that can be let through.
 
         Args:
             q: Commanded position (n,) [rad].
@@ -68,7 +68,7 @@ class Gate(Fixed):
         return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
 
     def notes(self) -> tuple[str, ...]:
-        """What is doubtful about what it measures by, in words; said once."""
+        """Doubts about the geometry that it measures with, in words; reported once."""
         bare, unsaid = bare_links(self.robot).names, self._unsaid
         self._unsaid = False
         if not (unsaid and bare):
@@ -78,7 +78,7 @@ class Gate(Fixed):
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Floats that it remembers, that it works in without points, and capsules."""
+        """How many floats it remembers, how many it works in without points, and how many capsules it has."""
         return len(self._known), self._lengths(0)[0], len(robot_capsules(self.robot).radii)
 
     def _lengths(self, points: int) -> tuple[int, int]:

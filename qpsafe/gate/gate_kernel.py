@@ -1,4 +1,4 @@
-"""The gate in one compiled call: the command, or what of it can be let through.
+"""The gate in one compiled call: the command, or the part of it that can be let through.
 
 With b the command that brakes at the limits, {b + λ (u - b)} is searched for the largest λ whose way passes. λ = 0 is
 verified already: its way is the rest of the last command's, and nobody's ball is larger than was reckoned with.
@@ -83,7 +83,7 @@ def let_through(
     floats: Array, integers: Index, own: Array, work: Array, whole: Index, q: Array, qd: Array, command: Array,
     points: Array, ages: Array, told: Array,
 ) -> float:  # fmt: skip
-    """Replace the command by what of it can be let through; returns the share λ.
+    """Replace the command by the part of it that can be let through; returns the share λ.
 
     Args:
         floats, integers: `Tables`.

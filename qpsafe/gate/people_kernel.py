@@ -18,8 +18,8 @@ distance from the axis of joint j at most, W = Σ_j |q̇_j|,
 (of ω_j × (p - o_j): from q̈_j; from turning axes, W |q̇_j| ρ_j; from moving ones, together W Σ |q̇_j| ρ_j; from the
 body's own turning, again W Σ |q̇_j| ρ_j). Within a tick joints do not accelerate. A tick passes if S(u(t + dt)) + C dt
 <= v_s; m ticks at once if S(u(t + m dt)) + (Σ_j a_j ρ_j + C) m dt <= v_s, which implies it of each of them. So what is
-told does not depend on which ticks are looked at; and if a way passes, what is left of it passes a tick later, for any
-p' that p may have moved to, if `sidestep` is infinite: all that has to hold then is among what held before.
+told does not depend on which ticks are looked at; and if a way passes, the rest of it passes a tick later, for any
+p' that p may have moved to, if `sidestep` is infinite: its conditions are then among those that held before.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Pairs of shapes are in groups: those of one body against what stands, those of two bodies. No point of a group comes
 nearer to its counterpart faster than V = Σ_j L_gj |q̇_j|. So a distance d measured once, at a configuration q*, holds
 good as long as  Σ_j L_gj |q_j - q*_j| < d - margin  all along the way: that is the usual tick, without any measuring.
-Else the distance is measured again, and if that does not do, at instants along the way: from one with the distance d
+Else the distance is measured again, and if that is not enough, at instants along the way: from one with the distance d
 on to the next one after (d - margin) / V, or at the end of the tick, or after d / V, where it has to be at least the
 margin again. So it is at the end of every tick, whatever is sent then; and between two instants a and b it is never
 below (d_a + d_b - V h)/2 >= d_b/2, half the margin.

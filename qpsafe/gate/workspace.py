@@ -1,4 +1,4 @@
-"""What the gate works in; nothing in it stays."""
+"""The gate's working memory; nothing in it is kept from call to call."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """One state machine over the stream of references: it only escalates until a person acknowledges.
 
 The states stand in their order of severity. Every event but the two acknowledgements leads to the same state or to a
-later one; what is not in `TRANSITIONS` changes nothing. docs/reference/supervisor.md draws this table, and a test
+later one; what is not in `TRANSITIONS` changes nothing. docs/reference/supervisor.md has this table, and a test
 compares both.
 
 This is no safety function: it runs on an ordinary computer, in Python. It orders what the software itself does.

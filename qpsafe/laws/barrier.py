@@ -31,7 +31,7 @@ class Scaling(NamedTuple):
 
     Attributes:
         factor: κ in [0, 1].
-        unreachable: Number of points whose static field alone exceeds the cap: no speed can mend that, and they do not
+        unreachable: Number of points whose static field alone exceeds the cap: no speed helps there, and they do not
             slow the evasive motion that leads away from them.
     """
 

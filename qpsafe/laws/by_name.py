@@ -1,4 +1,4 @@
-"""The laws by the names that command line and page have for them."""
+"""The laws, by the names that the command line and the page in the browser use."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def law_named(name: str, projection: str = "strict", solver: str | None = None) 
 
     Args:
         name: One of `LAWS`.
-        projection: Of the hierarchical law, one of `PROJECTIONS`; the others take no notice.
+        projection: Of the hierarchical law, one of `PROJECTIONS`; other laws ignore it.
         solver: Of the QPs; the law's default if None.
 
     Raises:

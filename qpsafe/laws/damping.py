@@ -8,7 +8,7 @@ at σ = 0 from both sides, and the robot is thrown to and fro at the joints' lim
     ε² = floor² + μ Σ_(j<=k) K_j |e_j|
 
 k <= c/μ whatever the error, slow enough for the tick and the joints' accelerations; and ε goes to zero with the errors:
-where tasks are met, be it on the move, nothing is damped. The tasks above count, since their corrections are what the
+where tasks are met, even in motion, nothing is damped. The tasks above count, since their corrections are what the
 task itself has to make up for.
 """
 

@@ -1,4 +1,4 @@
-"""What compiled ticks answered, explained as the law's own `solve` would: made when it is looked at."""
+"""Results of compiled ticks in the form that the law's own `solve` returns, made only when somebody looks at them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Solved(NamedTuple):
-    """What a compiled tick has in its blocks once the law has answered.
+    """Contents of a compiled tick's blocks after the law has answered.
 
     Attributes:
         A: Jacobians of the tasks (rows, n).
@@ -35,7 +35,7 @@ class Solved(NamedTuple):
         qd: The law's q̇ (n,).
         x: Answers of the solver (tasks + 1, n).
         info: What it says about them.
-        weights: Of the regimes; those without were not solved.
+        weights: Of the regimes; those without weight were not solved.
         counts: Rows of each task.
         taken: Time of the call [s].
         soft: Levels above the tasks.
@@ -59,8 +59,8 @@ def explain(s: Solved, solved: bool, kind: int, importance: Array, activations: 
     """The law's answer.
 
     Args:
-        s: What there is.
-        solved: Whether everything was.
+        s: Contents of the tick's blocks.
+        solved: Whether every regime was solved.
         kind: Of the law, see `kinds`.
         importance: w_1, ..., w_N, w_E of a weighted one.
         activations: (tasks,).
@@ -73,11 +73,11 @@ def explain(s: Solved, solved: bool, kind: int, importance: Array, activations: 
 
 
 class BlendResult(LawResult):
-    """A blend of solutions, which are made when they are looked at: the same bits as those of `solve_hierarchy`.
+    """A blend of solutions, each made only when somebody looks at it: the same bits as those of `solve_hierarchy`.
 
     Args:
-        s: What there is.
-        solved: Whether all regimes were.
+        s: Contents of the tick's blocks.
+        solved: Whether every regime was solved.
         weights: Of the regimes.
         packed: Makes the problem of a regime, by number.
     """
@@ -109,8 +109,8 @@ def hierarchy(s: Solved, kept: int, closing: Array | None = None) -> Packed:
     """[J_1 q̇ = ẋ_1 ≻ ... ≻ J_kept q̇ = ẋ_kept ≻ q̇ = closing].
 
     Args:
-        s: What there is.
-        kept: How many tasks are.
+        s: Contents of the tick's blocks.
+        kept: How many tasks are kept.
         closing: q̇0 if None.
     """
     counts, n = s.counts[:kept], len(s.qd0)
@@ -123,7 +123,7 @@ def under(s: Solved, A: Array, target: Array, counts: list[int]) -> Packed:
     """Equality levels below the soft ones.
 
     Args:
-        s: What there is.
+        s: Contents of the tick's blocks.
         A: (rows, n).
         target: (rows,).
         counts: Rows of each.
@@ -140,8 +140,8 @@ def paper_hierarchy(s: Solved, kept: int) -> Packed:
     """[J_1 q̇ = ẋ_1 ≻ q̇ = what the paper adds below], for two tasks and more.
 
     Args:
-        s: What there is.
-        kept: How many tasks are.
+        s: Contents of the tick's blocks.
+        kept: How many tasks are kept.
     """
     if kept < 2:
         return hierarchy(s, kept)
@@ -155,7 +155,7 @@ def weighted_level(s: Solved, importance: Array, activations: Sequence[float], k
     """The weighted sum as one level.
 
     Args:
-        s: What there is.
+        s: Contents of the tick's blocks.
         importance: w_1, ..., w_N, w_E.
         activations: (tasks,).
         kept: Always 0: there is one problem.

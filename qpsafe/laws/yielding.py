@@ -1,8 +1,8 @@
 """Tasks that do not push against what is above them, compiled.
 
 A row g q̇ <= h above a task J q̇ = ẋ may ask for nearly the same as the task: g ≈ cᵀJ, as where a tool's tip meets a
-table. If the task wants more than the row permits, cᵀẋ > h, a strict hierarchy gives all that is below the task away
-for what little can still be gained: the tool turns as fast as it can about the point that it touches. So the task's
+table. If the task wants more than the row permits, cᵀẋ > h, a strict hierarchy sacrifices everything below the task
+for the little that can still be gained: the tool turns as fast as it can about the point that it touches. So the task's
 wish along c is lowered to what the row permits,
 
     ẋ <- ẋ - w (cᵀẋ - h') c / cᵀc,   c = (J Jᵀ)⁻¹ J gᵀ,

@@ -65,7 +65,7 @@ class Fit:
 
     @property
     def few_wrong(self) -> bool:
-        """Whether so few pairs are wrong that the others tell the curve."""
+        """Whether so few pairs are wrong that the others determine the curve."""
         return int(self.wrong.sum()) <= MOST_WRONG * len(self.distances)
 
     @property

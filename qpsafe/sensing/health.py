@@ -120,7 +120,7 @@ def judge(
     seen: Array,
     dead: Array,
 ) -> int:
-    """Code of spot i's reading d; counts sick ticks, lets the dead die. Arrays as in `SpotHealth`.
+    """Code of spot i's reading d; counts sick ticks and declares spots dead. Arrays as in `SpotHealth`.
 
     An age is possible from `least` on, and up to `growth` more than in the last tick [s].
     """  # fmt: skip

@@ -19,7 +19,7 @@ class SensingRules:
             plus the radius of the spot's cone there [m].
         self_detection: Whether points on the robot itself are left out.
         hold_time: How long what a spot saw still counts when it is lost or something farther is read [s].
-        approach_speed: At which it is moved towards its spot meanwhile, until it is d_min from the robot's wire; the
+        approach_speed: Of the held point towards its spot meanwhile, until it is d_min from the robot's wire; the
             walking speed of ISO 13855 [m/s].
         jump: A reading this much farther than the one before is another thing, not the same one going away [m].
         max_age: An older reading is stale [s].

@@ -76,7 +76,7 @@ def check_surroundings(
         carried: As given.
 
     Raises:
-        ConfigurationError: Rules, an obstacle or a frame that is none.
+        ConfigurationError: Not rules, not an obstacle, or no frame of the robot.
     """
     if not isinstance(rules, SensingRules):
         raise ConfigurationError("SafetyController", "sensing", rules, "SensingRules")
@@ -104,10 +104,10 @@ class DistanceSensing(Fixed):
         dt: Tick [s].
         rules: What counts, and what a sick sensor does.
         known: Known obstacles of the surroundings.
-        carried: What tools may carry, by the frame it is fixed to and in its axes: seen as part of the robot.
+        carried: What tools may carry, keyed by the frame it is fixed to, in that frame's axes: part of the robot.
 
     Raises:
-        ConfigurationError: The spots do not fit the robot, or an obstacle is none.
+        ConfigurationError: The spots do not fit the robot, or something known is no `Obstacle`.
         RobotFileError: The robot's collision geometry cannot be read.
     """
 

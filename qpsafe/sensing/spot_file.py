@@ -32,7 +32,7 @@ class _Table(BaseModel):
 
 
 class SpotTable(_Table):
-    """One `[[spot]]`: of `direction` (a unit vector) and `rotation` (3 x 3, z along the measurement) just one.
+    """One `[[spot]]`: with either `direction` (a unit vector) or `rotation` (3 x 3, z along the measurement).
 
     `frame` is the Denavit-Hartenberg frame of the link if it is not given; ranges and field of view are the file's.
     """

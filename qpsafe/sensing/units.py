@@ -1,10 +1,10 @@
-"""Are these metres? Readings that nothing of their kind can tell, again and again, are centimetres or millimetres.
+"""Are these metres? Readings that no such sensor can give, again and again, are centimetres or millimetres.
 
 A sensor that gives 42.0 for 42 cm, or points in millimetres, make the robot blind without anything being wrong with a
-single reading: what lies beyond the range is healthy. But lengths have a scale. Sensors on a robot's skin end at some
-metres, and the nearest that the paper's tells, 0.15 m, is 15 in centimetres; what sees points around a robot ends at
-some tens of metres, and a cell's points in millimetres lie hundreds from its base. So a finite reading beyond
-`FARTHEST_READING` (or twice the range, if that is more), or points that all lie beyond `FARTHEST_POINT`, and this for
+single reading: what lies beyond the range is healthy. But lengths have a scale. Sensors on a robot's skin reach some
+metres, and the shortest distance that the paper's measures, 0.15 m, is 15 in centimetres; what sees points around a
+robot reaches some tens of metres, and a cell's points in millimetres lie hundreds from its base. So a finite reading
+beyond `FARTHEST_READING` (or twice the range, if that is more), or points that all lie beyond `FARTHEST_POINT`, for
 `LASTING`, is said to be in another unit. One reading that may be metres begins the time anew; +inf says nothing.
 """
 

@@ -64,13 +64,13 @@ class Closest(NamedTuple):
 
 
 def closest(station: Station, q: Array, tracks: PersonTracks, at_most: float = np.inf) -> Closest:
-    """Nearest points of the robot, its base among it, and people.
+    """Nearest points of the robot, its base included, and people.
 
     Args:
         station: With robot and world.
         q: Joint position at every tick (T, n) [rad].
         tracks: Everybody at the same ticks.
-        at_most: Larger distances are not of interest, +inf stands for them, unless all are larger [m].
+        at_most: Larger distances are told as +inf, unless all are larger [m].
     """
     ticks, (world, robot) = len(q), (station.world, station.robot)
     found, which = np.full((ticks, 7), np.nan), np.empty((ticks, 2), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Contacts of a run: when, where, what the robot did at the contact point one tick before, and how hard.
+"""Contacts of a run: when and where, how the contact point moved one tick before, and how hard the contact was.
 
 A contact begins at the first tick at which robot and person overlap; what is said of it is taken one tick before, where
 the two surfaces still have a nearest pair of points and a direction between them. People do not give way: a run goes on

@@ -1,4 +1,4 @@
-"""Who plays trials: this process, processes of its own, or any executor; what is done when a process dies.
+"""Who plays trials: this process, processes of our own, or any executor; and what happens when a process dies.
 
 Work is handed out a few pieces ahead, so memory is bounded, and comes back in any order.
 """
@@ -27,7 +27,7 @@ IN_FLIGHT = 32
 
 
 class WorkerDiedError(QpsafeError):
-    """A process died twice of the same work."""
+    """A process died twice while doing the same work."""
 
 
 class Crew(Protocol):
@@ -46,7 +46,7 @@ class Crew(Protocol):
         """Be ready again after a process has died."""
 
     def close(self, at_once: bool) -> None:
-        """Let everybody go; at once: without waiting for what they are at."""
+        """Release everybody; at once: without waiting for unfinished work."""
 
 
 class Alone:
@@ -67,7 +67,7 @@ class Alone:
         """Nothing can have died."""
 
     def close(self, at_once: bool) -> None:
-        """Nobody is to be let go."""
+        """There is nobody to release."""
 
 
 class Processes:
@@ -91,7 +91,7 @@ class Processes:
             return self._pool.submit(work, *arguments)
 
     def renew(self) -> None:
-        """Start other processes: a pool in which one has died ends the rest."""
+        """Start new processes: when one of a pool dies, the rest are ended."""
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._pool = self._new()
 
@@ -161,7 +161,7 @@ def answers(
 ) -> Generator[Answer, None, None]:
     """Have all pieces done; answers come in any order.
 
-    When a process dies, what was handed out is done once more, piece by piece: so the one that kills is known.
+    When a process dies, what was handed out is done once more, piece by piece: so that the fatal piece is known.
 
     Args:
         crew: Who does them.

@@ -1,4 +1,4 @@
-"""The same trial in MuJoCo, tick by tick: its rays, its distances, or its dynamics, against the engine's.
+"""The same trial in MuJoCo, tick by tick: its rays, distances or dynamics in place of the engine's.
 
 What is shared is the controller and where people are; shapes, rays and distances are MuJoCo's own here.
 """

@@ -34,7 +34,7 @@ def measures(plan: Plan, met: Meeting, name: str, run: Recording) -> dict[str, A
     Args:
         plan: The campaign.
         met: The encounter.
-        name: Of the controller, or of what is none of the registry's.
+        name: Of the controller, or of a policy that the registry does not know.
         run: Of it.
     """
     place, tracks = met.station, met.tracks
@@ -91,7 +91,7 @@ def _sight(run: Recording, met: Meeting, near: Closest) -> dict[str, Any]:
 
 
 def badness(row: dict[str, Any]) -> float:
-    """Harm in one number, larger is worse: what a search climbs.
+    """Harm in one number, larger is worse: what a search maximises.
 
     Without contact it is minus the smallest distance [m]. A contact adds, from 0 on, s/(1 + s) of the energy's share s
     of its limit, and v/(v + 0.1 m/s) of the robot's speed v towards the person.

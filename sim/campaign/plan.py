@@ -1,4 +1,4 @@
-"""What a campaign is: which robot does what among whom, and who is compared. A TOML file may say so.
+"""What a campaign is: which robot does what among whom, and who is compared. It can be read from a TOML file.
 
 Everything that decides a trial's rows stands here, so a plan has a digest: rows of another plan, or of other code, are
 never mixed with its own. How many trials there are is no part of it: a longer campaign goes on where a shorter one
@@ -51,7 +51,7 @@ class Plan:
         robot: A bundled robot, or the path of a robot folder, MJCF or URDF file.
         motions: Some of `MOTIONS`, or paths of programs (TOML); trials take turns with them.
         controllers: Names of what is compared.
-        sensor: One of `SENSORS`, what all controllers see by that do not say otherwise.
+        sensor: One of `SENSORS`, by which all controllers see that do not say otherwise.
         lag: Delay of the servos, in whole ticks, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
         trials: How many.

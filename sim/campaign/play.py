@@ -1,4 +1,4 @@
-"""A whole run in one compiled call, where all parts of a controller are plain: people, rays, tick and servo."""
+"""A whole run in one compiled call, where all parts of a controller can be compiled: people, rays, tick and servo."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run of one controller through one encounter, tick by tick: the general way, for whatever follows the contract.
+"""One run of one controller through one encounter, tick by tick: the general way, for any controller.
 
 The robot follows perfectly: measured at tick k is what tick k - 1 asked for; or with a servo's lag.
 """
@@ -36,7 +36,7 @@ class Recording(NamedTuple):
     Attributes:
         dt: Tick [s].
         q, qd: Measured (T, n) [rad, rad/s].
-        reference_q, reference_qd: What was asked for (T, n).
+        reference_q, reference_qd: References (T, n).
         phase: ``following``, ``suspended`` or ``recovering`` (T,).
         path_time: Clock of the path (T,) [s].
         status: Number in `STATUSES` (T,).

@@ -134,7 +134,7 @@ _ACCEPTED: dict[type, tuple[type, ...]] = {
 
 
 class RowError(QpsafeError):
-    """A trial gave what is no row: a mistake in the program that plays trials."""
+    """A trial gave something that is not a row: a mistake in the program that plays trials."""
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> Columns:

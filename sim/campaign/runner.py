@@ -1,7 +1,7 @@
 """Play a campaign's trials, keep what is finished, go on where it stopped.
 
 The unit of work is a trial with all its controllers. A trial depends on the plan and its number alone, so results are
-equal to the last bit whoever plays them, in whatever order and in how many goes.
+equal to the last bit whoever plays them, in whatever order, in one go or several.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ class Trials(NamedTuple):
 
 @dataclass(frozen=True)
 class Results:
-    """What a campaign found.
+    """Results of a campaign.
 
     Attributes:
         plan: Its plan.
         columns: Rows of all finished trials, by trial and in the plan's order of controllers.
-        seconds: That processes spent on trials, all together [s].
-        wall: That passed from beginning to end of the last go; None if it is not known [s].
+        seconds: Time that all processes together spent on trials [s].
+        wall: Wall time of the last go; None if it is not known [s].
         versions: Of what they were played with.
     """
 

@@ -20,7 +20,7 @@ LATER = 5  # ticks between two looks for those who are not the first to be seen
 
 
 def person_of(tracks: PersonTracks, segment: int, owners: Sequence[int]) -> int:
-    """Number of the person whose capsule, or board, that is.
+    """Number of the person to whom a capsule or board belongs.
 
     Args:
         tracks: Everybody.

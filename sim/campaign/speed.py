@@ -22,7 +22,7 @@ class Speed(NamedTuple):
     """Simulated seconds a second of processor time of one core, medians over encounters that take turns.
 
     Attributes:
-        engine: People, rays of all spots, the whole tick, true distances, from an encounter whose story is planned.
+        engine: People, rays of all spots, the whole tick and true distances, for encounters that are planned already.
         planned: The same, with planning what people do.
         mujoco: MuJoCo's rays, distances and dynamics, and the controller, in a Python loop; NaN if it was not timed.
     """

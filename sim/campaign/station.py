@@ -115,7 +115,7 @@ class Station:
 
     @cached_property
     def known(self) -> tuple[Obstacle, ...]:
-        """What of it the controller knows."""
+        """The part of the cell that the controller knows."""
         return tuple(known_obstacles(self.scene))
 
     @cached_property
@@ -154,7 +154,7 @@ class Station:
         return "base" if body == 0 else self.robot.joint_names[body - 1]
 
     def tasks(self, trajectory: Trajectory | None = None) -> list[Task]:
-        """Where all tools are, over how they are turned; the first one follows its reference, or another one.
+        """Positions of all tools, then their orientations; the first tool follows its reference, or another one.
 
         Args:
             trajectory: Instead of `reference`.
@@ -179,7 +179,7 @@ class Station:
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
     def nominal(self, ticks: int) -> float:
-        """Time on the path that is done after so many ticks where nobody comes [s]: less than theirs where events wait.
+        """Time on the path after so many undisturbed ticks [s]: less than theirs where events wait.
 
         Args:
             ticks: Of `dt`.
@@ -204,7 +204,7 @@ class Station:
 
     @cached_property
     def separation(self) -> Separation:
-        """Figures of a monitor made for this station: what servo and sensors are late by is in its reaction time."""
+        """Figures of a monitor made for this station: the delays of servo and sensors are part of its reaction time."""
         late = self.lag + 2.0 / OMEGA if self.lag > 0.0 else 0.0
         reaction = Separation.reaction_time + late + SENSOR_LATE.get(self.sensor, 0.0)
         return Separation(self.deceleration, reaction_time=reaction)

@@ -1,7 +1,7 @@
 """Finished trials on disk: Parquet files beside a manifest that says whose they are.
 
 Every file is written under another name first and then renamed, so a file is whole or not there, whatever ends the
-process. Its name stands for the trials in it: nothing is ever written over by something else.
+process. Its name stands for the trials in it: no file is ever overwritten by another one.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Played(NamedTuple):
 
     Attributes:
         columns: Rows of all their controllers.
-        seconds: That the processes which played them took, all together.
+        seconds: Time that the processes which played them took, all together.
     """
 
     columns: Columns
@@ -143,7 +143,7 @@ def stored_plan(folder: Path) -> Plan:
     """The plan of a folder's trials, as it was: not checked against what is here now.
 
     Raises:
-        ConfigurationError: The folder has no manifest, or one that is none.
+        ConfigurationError: The folder has no manifest, or an invalid one.
     """
     said = _manifest(folder)["plan"]
     plan = object.__new__(Plan)  # people's file, say, may have gone since

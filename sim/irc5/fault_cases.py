@@ -190,7 +190,7 @@ CASES: tuple[Case, ...] = (
         "seven joints, 40 ms",
         "rejects, counts",
         1,
-        _instead(lambda p: dataclasses.replace(p, q=np.append(p.q, 0.0))),
+        _instead(lambda p: dataclasses.replace(p, q=np.append(p.q, 0.0), q_planned=None)),
         refused("wrong_joint_count"),
         _well,
         10,

@@ -1,1 +1,1 @@
-"""The page of `qpsafe web`: a robot, people that one drags, and what the controller thinks of it, in a browser."""
+"""The page of `qpsafe web`: a robot, people to drag with the mouse, and what the controller makes of it."""

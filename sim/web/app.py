@@ -34,12 +34,12 @@ class App:
         setup: What is simulated first.
         page: Where it is served.
         folder: Where recordings go.
-        looks: Of the page.
+        looks: How the page looks at first.
 
     Attributes:
         live: The simulation.
-        wishes: What is asked of it.
-        frame: The newest that has come; None before the first.
+        wishes: What the page asks of it.
+        frame: The newest frame received; None before the first.
 
     Raises:
         ConfigurationError: The setup does not fit together.
@@ -62,10 +62,10 @@ class App:
         self._page = page
 
     def serve(self, leave: Callable[[], bool] = lambda: False) -> None:
-        """Show what comes until asked to leave.
+        """Show frames as they arrive until asked to leave.
 
         Args:
-            leave: Asked again and again.
+            leave: Asked repeatedly whether to stop.
 
         Raises:
             SimulationEndedError: Its process has died.
@@ -74,7 +74,7 @@ class App:
             self.turn()
 
     def turn(self) -> None:
-        """Show what has come meanwhile."""
+        """Show the frames that have arrived meanwhile."""
         frames = self.live.frames.received(WAIT)
         if self.live.frames.closed:
             raise SimulationEndedError("the simulation has ended by itself; what it said stands above")

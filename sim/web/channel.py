@@ -1,7 +1,7 @@
 """One way from one process to another: a pipe, into which one end only writes and out of which the other only reads.
 
-The writer never waits. What does not fit now is left out, so it sends states, of which the next one says all that the
-last one said. A pipe has a direction: nothing that the reader does can be read at the writer's end.
+The writer never waits. A message that does not fit at the moment is dropped, so messages are complete states: the
+next one supersedes the last. A pipe has a direction: nothing that the reader does can be read at the writer's end.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Outbound:
         connection: The writable end of a pipe; it is made not to block.
 
     Attributes:
-        left_out: How many messages have found no room, or nobody.
+        left_out: How many messages were dropped, for want of room or of a reader.
         closed: Whether the reader has gone.
     """
 
@@ -57,7 +57,7 @@ class Outbound:
         return not (self._rest or self.closed)
 
     def fileno(self) -> int:
-        """Of the descriptor, which can be written only."""
+        """Number of the descriptor, which can only be written to."""
         return self._connection.fileno()
 
     def close(self) -> None:
@@ -82,7 +82,7 @@ class Inbound:
         self.closed = False
 
     def received(self, patience: float = 0.0) -> list[Any]:
-        """All messages that are here, in their order.
+        """All messages that have arrived, in order.
 
         Args:
             patience: How long to wait if there are none [s].

@@ -1,4 +1,4 @@
-"""The page's switches: whatever is changed becomes a wish, and the newest wish says it all."""
+"""The page's switches: every change becomes a wish, and the newest wish states everything."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Wishes:
         self._outbound, self._lock, self._sent = outbound, threading.Lock(), 0
 
     def change(self, **fields: Any) -> None:
-        """Wish for something else; fields of `Wish`, or of its setup."""
+        """Change the wish: fields of `Wish`, or of its setup."""
         with self._lock:
             own = {name: value for name, value in fields.items() if name in Wish._fields}
             others = {name: value for name, value in fields.items() if name not in own}
@@ -44,7 +44,7 @@ class Wishes:
             self._send()
 
     def remind(self) -> None:
-        """Say it once more, if there was no room for it."""
+        """Send the wish again if there was no room for it."""
         with self._lock:
             if self._sent != self.now.number:
                 self._send()
@@ -125,7 +125,7 @@ class Controls:
             own.on_click(lambda _: self._wishes.change(thresholds=None, mass=1.0, damping=1.0))
 
     def fit(self, setup: Setup) -> None:
-        """Put the sliders of thresholds where they are."""
+        """Set the threshold sliders to the thresholds in effect."""
         values = setup.thresholds or own_thresholds(load_robot(setup.robot))
         for slider, value in zip(self._thresholds, values, strict=True):
             if slider.value != value:
@@ -141,7 +141,7 @@ class Controls:
         self.reset(setup)
 
     def reset(self, setup: Setup) -> None:
-        """Put all inputs where a setup has them."""
+        """Set all inputs to the values of a setup."""
         for name, (handle, shown) in self._inputs.items():
             value = shown(getattr(setup, name))
             if handle.value != value:

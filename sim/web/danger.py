@@ -1,4 +1,4 @@
-"""What the controller sees and fears, drawn into a page: rays, points, danger vectors, links in danger's colours."""
+"""What the controller sees and its danger, on a page: rays, points, danger vectors, links in danger's colours."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Danger:
 
 
 def grey(colour: tuple[int, int, int]) -> Array:
-    """A light grey for a colour, darker for a darker one, with a little of it left (3,)."""
+    """A light grey for a colour, darker for a darker one, tinted slightly with the colour (3,)."""
     luma = float(np.dot((0.30, 0.59, 0.11), colour)) / 255.0
     return 0.12 * np.array(colour) + 0.88 * 235.0 * np.sqrt(luma)
 

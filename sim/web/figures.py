@@ -1,4 +1,4 @@
-"""The page's numbers, plots and words: what a tick says, at a pace that a person can read."""
+"""The page's numbers, plots and words: what a tick says, updated slowly enough to be read."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HEIGHT = 118  # of a plot [px]
 
 
 class Numbers:
-    """A table of figures; what tests read has an id.
+    """A table of figures; those that tests read have an id.
 
     Args:
         gui: Viser's.
@@ -95,11 +95,11 @@ class Numbers:
 
 
 class Plots:
-    """The last `WINDOW` seconds of what decides.
+    """Plots of the last `WINDOW` seconds of danger, switches, errors and distance.
 
     Args:
         gui: Viser's; the plots go where its context is.
-        distance: Whether anybody knows how far people are.
+        distance: Whether the true distance to people is known.
     """
 
     def __init__(self, gui: Any, distance: bool = True) -> None:

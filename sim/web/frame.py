@@ -1,4 +1,4 @@
-"""What a loop tells its page, some thirty times a second: the newest tick, and the worst since the page was told."""
+"""What a loop tells its page, some thirty times a second: the newest tick, and the worst since the last frame."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ NO_POSES, NO_TIMES = np.empty((0, 7)), np.empty((0, 2))
 
 
 class Row(NamedTuple):
-    """One moment of the plots, of which nothing that lasts a tick is lost: the worst since the row before.
+    """One point of the plots: the worst values since the point before, so that no event of a single tick is lost.
 
     Attributes:
         time: [s].
         cdf_n: The largest.
         m, f: The smallest.
-        distance: The smallest true distance to people, boards included; NaN where nobody knows [m].
+        distance: The smallest true distance to people, boards included; NaN where it is not known [m].
         position: The largest error of the tasks' first half, which are positions [m].
         orientation: Likewise of the rest [rad].
     """
@@ -55,7 +55,7 @@ class Frame(NamedTuple):
         state: What the loop is doing, in a word.
         note: What went wrong with the last wish, in words; empty if nothing did.
         wish: Number of the newest wish that has been followed.
-        since: Monotonic clock at the first tick that counted with it [s].
+        since: Monotonic clock at the first tick that took it into account [s].
         setup: What is simulated; None where nothing is.
         qpos: State of the whole scene, where more than robot and people moves.
     """
@@ -82,7 +82,7 @@ class Worst:
         self._rows: list[Row] = []
 
     def add(self, tick: Tick, distance: float = float("nan")) -> None:
-        """Count with a tick.
+        """Take a tick into account.
 
         Args:
             tick: The tick.
@@ -94,7 +94,7 @@ class Worst:
         self._rows.append(Row(tick.reference.time, tick.cdf_n, tick.m, tick.f, distance, position, orientation))
 
     def take(self) -> Row | None:
-        """The worst of all since it was taken last; None if there were none."""
+        """The worst of all ticks since the last call; None if there were none."""
         if not self._rows:
             return None
         rows, self._rows = np.array(self._rows), []
@@ -106,7 +106,7 @@ class Worst:
 
 
 class Every:
-    """Whether so much time has passed.
+    """Says whether a period has passed.
 
     Args:
         period: [s].
@@ -116,7 +116,7 @@ class Every:
         self._period, self._last = period, -math.inf
 
     def __call__(self) -> bool:
-        """Whether it has since this was true last."""
+        """Whether the period has passed since this was last true."""
         now = time.monotonic()
         if now - self._last < self._period:
             return False

@@ -23,7 +23,7 @@ PACES = (1.0, 0.5, 0.25, 0.1)  # of the simulation's clock
 
 
 class Wish(NamedTuple):
-    """All that the page asks for: the newest one counts, whatever has become of those before.
+    """All that the page asks for: the newest one counts, whatever became of earlier ones.
 
     Attributes:
         number: Each has a larger one.
@@ -33,7 +33,7 @@ class Wish(NamedTuple):
         pace: Of the simulation's clock, one of `PACES`.
         steps: How many single ticks have been asked for so far.
         restarts: How often the run was to begin anew.
-        record: Whether what happens is to be written down.
+        record: Whether the run is to be recorded.
     """
 
     number: int = 0
@@ -47,7 +47,7 @@ class Wish(NamedTuple):
 
 
 class Live:
-    """A run that follows wishes; at another run's wish it begins anew.
+    """A run that follows wishes; a wish for another run begins it anew.
 
     Args:
         setup: To begin with.
@@ -137,7 +137,7 @@ class Live:
         self.note = why
 
     def tick(self) -> float:
-        """Sense, decide, measure, move; returns how long the controller has taken [s].
+        """Sense, decide, measure, move; returns the controller's time [s].
 
         Raises:
             SimulationFailedError: MuJoCo raised a warning.

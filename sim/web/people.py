@@ -79,7 +79,7 @@ class Crowd:
         self.drag = drag
 
     def __call__(self, tick: int) -> Sequence[PersonPose]:
-        """Everybody at a tick; who is dragged comes nearer to the mouse once a tick."""
+        """Everybody at a tick; the person who is dragged moves towards the mouse once a tick."""
         if tick != self._tick:
             self._tick = tick
             way = np.asarray(self.drag.place) - self.place

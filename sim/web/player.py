@@ -100,7 +100,7 @@ class Player:
             self.seek(float(event.target.value))
 
     def seek(self, at: float) -> None:
-        """Go to a time [s]; the nearest that there is."""
+        """Go to the recorded frame nearest to a time [s]."""
         self.position = min(max(round(at * FPS), 0), len(self._frames) - 1)
 
     def serve(self, leave: Callable[[], bool]) -> None:
@@ -120,7 +120,7 @@ class Player:
             time.sleep(IDLE)
 
     def show(self) -> None:
-        """Show the frame where time stands, if it is not shown already."""
+        """Show the frame at the present time, if it is not shown already."""
         if self.position == self._shown:
             return
         self._shown = position = self.position

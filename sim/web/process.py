@@ -41,8 +41,8 @@ class LiveProcess:
         folder: Where recordings go.
 
     Attributes:
-        frames: What it tells.
-        wishes: What is asked of it.
+        frames: Where its frames arrive.
+        wishes: Where wishes are sent to it.
     """
 
     def __init__(self, setup: Setup, folder: Path) -> None:
@@ -114,6 +114,6 @@ def _run(setup: Setup, folder: Path, told: Connection, asked: Connection) -> Non
 
 
 def niced() -> None:
-    """Give way to others: pages may be late, loops may not."""
+    """Lower this process's priority: pages may be late, loops may not."""
     if hasattr(os, "nice"):
         os.nice(10)

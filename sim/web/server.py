@@ -1,4 +1,4 @@
-"""The web server of a page: viser, bound to one address, closed to strangers, and honest about a port that is taken."""
+"""The web server of a page: viser, bound to one address, closed to strangers, clear about a port that is taken."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def need_viser() -> Any:
 
 
 def check_port(host: str, port: int) -> None:
-    """See that a page can be served there.
+    """Check that a page can be served there.
 
     Args:
         host: Address of this computer.
         port: 0 for any free one.
 
     Raises:
-        ConfigurationError: The port is taken, or the host is none of this computer.
+        ConfigurationError: The port is taken, or the host is no address of this computer.
     """
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
@@ -84,7 +84,7 @@ class Page:
         host: Address to listen at.
         port: Port; 0 for any free one.
         title: Of the panel.
-        token: Whoever opens the page must know it; empty for nobody must.
+        token: Must be known to open the page; empty for none.
 
     Attributes:
         server: Viser's.
@@ -131,9 +131,9 @@ class Page:
 
 @contextmanager
 def guarded(token: str) -> Iterator[None]:
-    """Servers that are opened meanwhile answer only who comes from their own page, and knows the token.
+    """Servers opened inside this context answer only requests of their own page that carry the token.
 
-    Viser has no hook for this: what it opens its server by is replaced as long as that takes.
+    Viser has no hook for this, so the function by which it opens its server is replaced for that time.
     """
     from viser.infra import _infra
 

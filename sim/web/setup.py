@@ -44,9 +44,9 @@ class Setup:
     Attributes:
         robot: As for `load_robot`.
         task: `HOLD`, `MOVE`, or the path of a program's file.
-        story: `NOBODY`, `STRAIGHT`, `RANDOM`, or the path of a story's file: who comes besides who is dragged.
+        story: `NOBODY`, `STRAIGHT`, `RANDOM`, or the path of a story's file: who comes besides the one who is dragged.
         seed: Of the people at random.
-        board: Whether who is dragged carries a card board.
+        board: Whether the person who is dragged carries a card board.
         sight: ``ideal``, ``sharp`` or ``perfect``; a robot without sensors has perfect sight.
         lag: Of the servo [s].
         law: One of `LAWS`.
@@ -74,17 +74,17 @@ class Setup:
     damping: float = 1.0
 
     def same_run(self, other: Setup) -> bool:
-        """Whether a run goes on when one takes the place of the other."""
+        """Whether a run can go on when one setup replaces the other."""
         kept = [field.name for field in fields(self) if field.name not in LIVE]
         return all(getattr(self, name) == getattr(other, name) for name in kept)
 
     @property
     def scenery(self) -> tuple[str, str, int, bool]:
-        """What decides how the scene looks."""
+        """The fields that decide how the scene looks."""
         return self.robot, self.story, self.seed, self.board
 
     def experiment(self) -> FixedExperiment:
-        """The experiment that this is, with who is dragged as its story's first person.
+        """The experiment; its story's first person is the one who is dragged.
 
         Raises:
             ConfigurationError: Names what does not fit.
@@ -108,7 +108,7 @@ class Setup:
         return PathExperiment(robot, program=LINE if self.task == MOVE else Path(self.task), **given)
 
     def apply(self, controller: SafetyController, experiment: FixedExperiment) -> None:
-        """Exchange what may be exchanged while a controller runs; the next tick counts with it.
+        """Change what may change while a controller runs; it counts from the next tick on.
 
         Args:
             controller: The controller; nothing has changed where a part is refused.

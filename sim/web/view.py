@@ -46,7 +46,7 @@ class View:
         server: Viser's.
         scene: What is drawn first.
         looks: Dark or light, with shadows or without.
-        distance: Whether anybody knows how far people are.
+        distance: Whether the true distance to people is known.
     """
 
     def __init__(self, server: Any, scene: Scene, looks: Looks = PLAIN, distance: bool = True) -> None:
@@ -126,7 +126,7 @@ class View:
         self.numbers.take(frame)
 
     def show(self, frame: Frame, at_once: bool = False, asked: int = 0) -> None:
-        """Draw a frame, as far as it is time to.
+        """Draw those parts of a frame whose time has come.
 
         Args:
             frame: The frame.

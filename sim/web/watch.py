@@ -13,6 +13,7 @@ import sys
 import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,7 @@ class Watch:
     Args:
         robot: As for `load_robot`.
         experiment: Whose cell is drawn, by name; None for a bare one.
+        cell: File of the furniture that is drawn instead; None for none.
         host: To serve the page at.
         port: Likewise.
         token: That the page asks for; empty for none.
@@ -50,11 +52,13 @@ class Watch:
         MissingExtraError: Viser is not installed.
     """
 
-    def __init__(self, robot: str, experiment: str | None, host: str, port: int, token: str = "") -> None:
+    def __init__(
+        self, robot: str, experiment: str | None, cell: Path | None, host: str, port: int, token: str = ""
+    ) -> None:
         need_viser()
         check_port(host, port)
         reading, writing = one_way()
-        self._process = spawn(_serve, reading, robot, experiment, host, port, token)
+        self._process = spawn(_serve, reading, (robot, experiment, cell), host, port, token)
         reading.close()
         self.host, self.port = host, port
         self.outbound = Outbound(writing)
@@ -67,7 +71,7 @@ class Watch:
         return self._process.pid or 0
 
     def observe(self, tick: Tick | None, q: Array | None, state: str, response: float) -> None:
-        """Tell of a tick; never waits, and never learns whether anybody looks.
+        """Report a tick; never waits, and never learns whether anybody looks.
 
         Args:
             tick: The newest; None before the first.
@@ -103,16 +107,14 @@ class Watch:
         return False
 
     def close(self) -> None:
-        """Say that nothing more comes; the page ends by itself."""
+        """Say that no more frames come; the page's process then ends."""
         self.outbound.close()
         self._process.join(1.0)
         if self._process.is_alive():
             self._process.kill()
 
 
-def _serve(
-    reading: Connection, robot: str, experiment: str | None, host: str, port: int, token: str
-) -> None:  # fmt: skip
+def _serve(reading: Connection, shown: tuple[str, str | None, Path | None], host: str, port: int, token: str) -> None:
     """Show frames until nothing more comes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     niced()
@@ -123,7 +125,7 @@ def _serve(
 
     page = Page(host, port, "qpsafe stream: to be looked at only", token)
     with suppress(KeyboardInterrupt):
-        view = View(page.server, scene_of(robot, experiment), distance=False)
+        view = View(page.server, scene_of(*shown), distance=False)
         with view.tabs.add_tab("Show"):
             view.add_looks()
         show_all(inbound, view, page)
@@ -131,10 +133,10 @@ def _serve(
 
 
 def show_all(inbound: Inbound, view: Any, page: Any) -> None:
-    """Show what comes until nothing more does.
+    """Show frames until no more arrive.
 
     Args:
-        inbound: Where frames come from.
+        inbound: Where frames arrive.
         view: What shows them.
         page: Whose.
     """
@@ -146,19 +148,26 @@ def show_all(inbound: Inbound, view: Any, page: Any) -> None:
             view.show(frames[-1])
 
 
-def scene_of(robot: str, experiment: str | None) -> Any:
-    """The cell that is drawn: an experiment's, or one without anything but the robot.
+def scene_of(robot: str, experiment: str | None = None, cell: Path | None = None) -> Any:
+    """The cell that is drawn: an experiment's, or one with a robot and known furniture only.
 
     Args:
         robot: As for `load_robot`.
         experiment: Its name, None for none.
+        cell: File of the furniture, None for none; an experiment has its own.
+
+    Raises:
+        ConfigurationError: As `load_robot` and `load_cell`.
     """
     from qpsafe.robot.loader import load_robot
+    from qpsafe.sensing.cell_file import load_cell
     from qpsafe.sim.experiments.by_name import experiment_loop
     from qpsafe.sim.experiments.fixed.stage import robot_stage
+    from qpsafe.sim.world.known import furnished
     from qpsafe.sim.world.scene import build_scene
 
     found = load_robot(robot)
     if experiment is not None:
         return experiment_loop(experiment, found)[0].scene
-    return build_scene(found, pedestal=robot_stage(found).pedestal, people=())
+    known = () if cell is None else load_cell(cell)
+    return build_scene(found, pedestal=robot_stage(found).pedestal, people=(), furnish=furnished(known))

@@ -60,8 +60,8 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
     inside position, velocity and acceleration limits, as a controller's commands are; with a number that is not finite
     in it, the whole action counts for nothing and the robot brakes. `info` says both.
 
-    The work's clock goes on while the tool is within `ON_PATH` of its reference, no faster than a robot is whom nobody
-    disturbs. Reward of a tick: 1 if it goes on, minus up to `HARM` for what is nearer than `CAREFUL`, minus `TOUCH`
+    The work's clock goes on while the tool is within `ON_PATH` of its reference, no faster than for an undisturbed
+    robot. Reward of a tick: 1 if it goes on, minus up to `HARM` for people nearer than `CAREFUL`, minus `TOUCH`
     at the first contact.
 
     Args:
@@ -73,7 +73,7 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         stop_at_contact: Whether a contact ends the episode; a campaign's trials go on.
 
     Raises:
-        ConfigurationError: Of a value that is none of these.
+        ConfigurationError: A value is none of these.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}

@@ -46,7 +46,7 @@ class ControllerPolicy:
             station: Of the environment.
 
         Raises:
-            ConfigurationError: There is none of this name, or it is told more than observations say.
+            ConfigurationError: There is none of this name, or it needs to know more than observations say.
         """
         entry = opponent(name)
         if entry.sight == POINTS:

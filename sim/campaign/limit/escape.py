@@ -1,4 +1,4 @@
-"""One trial from its first detection on: what joint motion is possible, and how near people come to it."""
+"""One trial from its first detection on: which joint motions are possible, and how near people come."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Escape:
         first: As given.
         people: Everybody, to be measured along runs.
         before: Smallest distance up to the first command [m].
-        fixed: Smallest distance that no motion changes [m]: up to the first tick that a command moves, and to the base.
+        fixed: Smallest distance that no motion can change [m]: before the first command takes effect, and to the base.
     """
 
     def __init__(

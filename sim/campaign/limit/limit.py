@@ -1,7 +1,7 @@
 """What a controller could have reached in a trial: the best motion with foresight from its first detection on.
 
 A lower bound of what is possible: a motion that was found, with the same arm, the same state and the same limits, by
-one who knows how everybody will move. Better ones may exist.
+somebody who knows in advance how everybody will move. Better ones may exist.
 """
 
 from __future__ import annotations

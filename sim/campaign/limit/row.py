@@ -20,13 +20,13 @@ class Limit(NamedTuple):
         alone: Without control [m].
         limit: The largest that was found, of a motion that keeps off furniture, floor and the robot itself [m]; NaN
             where nobody was seen before contact, or no such motion was found.
-        fixed: Largest that any motion could have: what came before it, and to the robot's base [m]; NaN if nobody was
-            seen.
+        fixed: The largest that any motion could reach, given what came before it and the robot's base [m]; NaN if
+            nobody was seen.
         contact: Whether the controller's run has one.
         seen: Whether anybody was seen before a contact, or there was none.
         avoidable: A contact that the motion found does not have.
-        reached: (distance - alone) / (limit - alone): 0 as without control, 1 all that was found to be possible; NaN
-            where that is nothing.
+        reached: (distance - alone) / (limit - alone): 0 as without control, 1 the best that was found; NaN
+            where the two are equal.
         evaluations: Motions that were tried.
     """
 
@@ -47,7 +47,7 @@ class Limit(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """What it comes to, in words."""
+        """A summary in words."""
         if not self.contact:
             return "There was no contact."
         if not self.seen:

@@ -118,7 +118,7 @@ def register(name: str, make: Callable[[Station], Controls], sentence: str = "a 
         sentence: What it is, for the report.
 
     Raises:
-        ConfigurationError: The name is taken, or is none.
+        ConfigurationError: The name is taken, or not a valid name.
     """
     if not name or name.endswith(PERFECT) or name in _known or ":" in name:
         raise ConfigurationError("campaign", "controllers", name, "a new name, without ':' and " + PERFECT)

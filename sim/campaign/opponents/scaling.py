@@ -25,7 +25,7 @@ _LEAST = 1e-4  # an approach slower than this at the full rate needs no scaling 
 
 
 class Clocked:
-    """A trajectory on a clock of its own, which runs at a rate that somebody sets.
+    """A trajectory on a clock of its own, which runs at a rate that is set from outside.
 
     Args:
         trajectory: What is followed.
@@ -38,7 +38,7 @@ class Clocked:
         self._waiting = False  # at one
 
     def sample(self, _: float) -> Any:
-        """The reference of now, whatever time is asked for."""
+        """The present reference, whatever time is asked for."""
         return self.full().slowed(0.0 if self._waiting else self.rate)
 
     def full(self) -> Any:

@@ -1,6 +1,6 @@
 """Stop-only monitoring: what cells do today. Too near for its speed, the robot brakes and stands until there is room.
 
-Made as well as we could: the exact S_p of the actual approach speed of every body against every seen point, its true
+Made as strong as we could: the exact S_p of the actual approach speed of every body against every seen point, its true
 shape, braking at the joints' limits at once, and work that goes on by itself, back to the path where it was left.
 """
 

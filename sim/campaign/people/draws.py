@@ -44,13 +44,13 @@ class Draw:
             the reach, to turn round.
         stay: How long.
         leave: Direction they leave into, beside the one they came from.
-        back: Whether they leave backwards.
+        back: Whether they leave walking backwards.
         left: Whether they reach with the left hand.
         along: Where on the robot they reach, 0 shoulder to 1 tool.
-        aside: Of it, along x, y and z.
+        aside: How far from that place, along x, y and z.
         hand_speed: Peak.
         late: How late that peak is.
-        early: How long before they stand, the hand sets out.
+        early: How long before they stand still the hand sets out.
         lean: Of a stumbling trunk [deg]; who falls farther, falls faster.
         turned: By how much they turn round, to the left if positive.
         turning: Peak rate of that [deg/s].

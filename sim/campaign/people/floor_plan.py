@@ -30,7 +30,7 @@ class Rectangle(NamedTuple):
     y1: float
 
     def grown(self, by: float) -> Rectangle:
-        """Larger by so much on every side [m]."""
+        """The rectangle enlarged by this much on every side [m]."""
         return Rectangle(self.x0 - by, self.x1 + by, self.y0 - by, self.y1 + by)
 
     def contains(self, x: float, y: float) -> bool:
@@ -51,7 +51,7 @@ class FloorPlan:
         tool: Where the tool works [m].
         reach: How far the robot reaches from its base axis [m].
         base: Where that axis stands [m].
-        obstacles: What nobody walks through: the pedestal, tables.
+        obstacles: What nobody can walk through: the pedestal, tables.
     """
 
     floor: float

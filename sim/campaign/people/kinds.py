@@ -56,7 +56,7 @@ class Visit:
         Args:
             distance: [m].
             angle: Direction from the base axis [rad].
-            aside: To the left of who looks at the robot [m].
+            aside: To the left of somebody who looks at the robot [m].
         """
         (x, y), c, s = self.plan.base, math.cos(angle), math.sin(angle)
         return x + distance * c + aside * s, y + distance * s - aside * c
@@ -79,7 +79,7 @@ class Visit:
             self.wait(self.draw.delay)
 
     def edge(self, beyond: float) -> Place:
-        """So far before what stands in the way between the robot and where they come from [m]."""
+        """A place this far in front of whatever stands between the robot and where they come from [m]."""
         place = self.plan.out(self.plan.base, self.draw.azimuth)
         beyond += 0.42 if self.draw.board else 0.0  # which is carried so far ahead
         ahead = (place[0] + beyond * math.cos(self.draw.azimuth), place[1] + beyond * math.sin(self.draw.azimuth))

@@ -1,4 +1,4 @@
-"""Encounters from stories that somebody wrote: one of them, as another day would see it."""
+"""Encounters from stories that somebody wrote: one of them, varied as on another day."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def mixed(parts: Sequence[Spread], weights: Sequence[float], u: float) -> float:
 
     Args:
         parts: Spreads.
-        weights: How often each of them is meant; they sum up to 1.
+        weights: Share of each of them; they sum to 1.
         u: 0 to 1.
     """
     used = [(part, weight) for part, weight in zip(parts, weights, strict=True) if weight > 0.0]

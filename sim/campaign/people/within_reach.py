@@ -1,4 +1,4 @@
-"""The point nearest to where a hand wants to be that it can get to, without a step."""
+"""The point nearest to a hand's goal that it can reach without a step."""
 
 from __future__ import annotations
 

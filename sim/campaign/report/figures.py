@@ -126,7 +126,7 @@ def energy_figure(rows: dict[str, Columns]) -> Figure:
 
 
 def kinds_figure(controllers: dict[str, dict[str, Any]]) -> Figure:
-    """Contacts by what the robot did then, and by whether the touched part had been seen, stacked.
+    """Contacts by what the robot did at the time, and by whether the touched part had been seen, stacked.
 
     Args:
         controllers: Of a summary.
@@ -170,7 +170,7 @@ def svg(figure: Figure, name: str) -> str:
 
     Args:
         figure: The figure.
-        name: Makes its inner names differ from those of others on the page.
+        name: Prefix that keeps its ids apart from those of other figures on the page.
     """
     import matplotlib
 

@@ -1,4 +1,4 @@
-"""What must never be: a controller that passes limits, or one that is worse for people than no control at all."""
+"""What must never happen: a controller that passes limits, or one that is worse for people than no control at all."""
 
 from __future__ import annotations
 

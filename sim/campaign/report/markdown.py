@@ -33,7 +33,7 @@ def filled(text: str, found: dict[str, Any] | None = None) -> str:
         found: A summary; None if there is none.
 
     Raises:
-        ConfigurationError: A comment asks for what there is not.
+        ConfigurationError: A comment asks for something that does not exist.
     """
     return _TABLE.sub(
         lambda mark: f"<!-- campaign: {mark[1]} -->\n\n{_table(mark[1], found)}\n\n<!-- campaign: end -->", text

@@ -2,7 +2,7 @@
 
 An encounter is a point of the unit cube. A quarter of the budget is random; from the worst of that, CMA-ES climbs in
 the coordinates in which an encounter is continuous, those that choose between things kept, one start after the other.
-As many random trials are played beside it, to see what searching is worth.
+As many random trials are played beside it, to see how much the search gains.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Case(NamedTuple):
 
     @property
     def harm(self) -> float:
-        """What the search maximises; what is no number is no harm."""
+        """What the search maximises; anything that is not a number counts as no harm."""
         value = float(self.row["search"])
         return value if np.isfinite(value) else -np.inf
 
@@ -83,7 +83,7 @@ class Found:
 
     @property
     def sentence(self) -> str:
-        """What it comes to, in words."""
+        """A summary in words."""
         touched, near = (sum(bool(case.row["contact"]) for case in cases) for cases in (self.searched, self.random))
         text = (
             f"{self.budget:,} searched trials: {len(self.searched):,} nearer than {1e3 * NEAR:.0f} mm, {touched:,} of "

@@ -23,6 +23,7 @@ QUICK = (
     "junk after every packet",
     "motors off for 0.4 s",
     "NaN for a joint, 40 ms",
+    "seven joints, 40 ms",
     "packets lost for 0.3 s",
     "Ctrl-C",
 )

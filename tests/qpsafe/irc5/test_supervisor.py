@@ -193,11 +193,15 @@ def test_a_wrong_category_is_refused() -> None:
         Supervisor().stop(3, "no such category")  # type: ignore[arg-type]
 
 
-def test_the_diagram_is_the_table() -> None:
-    """States and edges of the page's mermaid diagram are those of the code."""
-    (block,) = re.findall(r"^```mermaid\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    drawn = re.findall(r"^\s*(\w+) --> (\w+): (.+)$", block, re.MULTILINE)
-    edges = [(a, word.strip(), b) for a, b, words in drawn for word in words.split(",")]
-    assert len(edges) == len(set(edges))
-    assert set(edges) == {(a.value, event.value, b.value) for (a, event), b in TRANSITIONS.items()}
-    assert f"[*] --> {Supervisor().state}" in block
+def test_the_pages_table_is_that_of_the_code() -> None:
+    """Transitions of the page are those of the code, states in their order of severity; the drawing has each state."""
+    page = PAGE.read_text(encoding="utf-8")
+    head, _, *rows = re.search(r"^\| in \|.*?\n\n", page, re.MULTILINE | re.DOTALL)[0].strip().splitlines()  # type: ignore[index]
+    events = [cell.strip() for cell in head.strip("|").split("|")][1:]
+    assert set(events) == {event.value for event in Event}
+    cells = [[cell.strip(" `") for cell in row[1:-1].split("|")] for row in rows]
+    assert [before for before, *_ in cells] == [state.value for state in State]
+    told = {(before, event, after) for before, *row in cells for event, after in zip(events, row, strict=True) if after}
+    assert told == {(a.value, event.value, b.value) for (a, event), b in TRANSITIONS.items()}
+    drawing = page[page.index("```\n") : page.index("| in |")]
+    assert set(re.findall(r"│ (\w+) │", drawing)) == {state.value for state in State}

@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -17,8 +18,13 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 import qpsafe
+from qpsafe.sensing.cell_file import load_cell
+from qpsafe.sensing.hulls import Obstacle
+from qpsafe.sim.web.bodies import Bodies
 from qpsafe.sim.web.frame import EVERY
-from qpsafe.sim.web.watch import Watch
+from qpsafe.sim.web.watch import Watch, scene_of
+from qpsafe.sim.world.known import furnished, known_obstacles
+from qpsafe.sim.world.scene import build_scene
 
 ROBOT = qpsafe.load_robot("irb140")
 TICKS = 60 * EVERY
@@ -45,7 +51,7 @@ def watch() -> Iterator[Watch]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    watch = Watch("irb140", None, "127.0.0.1", port)
+    watch = Watch("irb140", None, None, "127.0.0.1", port)
     assert watch.wait()
     yield watch
     watch.close()
@@ -101,9 +107,55 @@ def test_a_page_that_is_killed_is_no_trouble() -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    watch = Watch("irb140", None, "127.0.0.1", port)
+    watch = Watch("irb140", None, None, "127.0.0.1", port)
     watch._process.kill()
     watch._process.join()
     assert not watch.wait(1.0)
     assert run(watch) == run(None)
     watch.close()
+
+
+class Drawing:
+    """A server's scene that keeps the vertices of its meshes."""
+
+    def __init__(self) -> None:
+        self.scene, self.vertices = self, list[Any]()
+
+    def add_mesh_simple(self, _: str, vertices: Any, *__: Any, **___: Any) -> None:
+        self.vertices.append(vertices)
+
+    def add_frame(self, *_: Any, **__: Any) -> Any:
+        return SimpleNamespace()
+
+    def add_grid(self, *_: Any, **__: Any) -> None: ...
+
+
+def test_furniture_of_the_cells_file_is_drawn_where_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text(
+        '[[box]]\nname = "table"\nsize = [0.8, 1.2, 0.05]\ncentre = [0.9, 0.1, 0.1]\n'
+        '[[hull]]\nname = "ramp"\nvertices = [[1, 0, 0], [1, 0.4, 0], [1.4, 0, 0], [1.4, 0.4, 0.3]]\n'
+    )
+    known, drawing = load_cell(file), Drawing()
+    Bodies(drawing, scene_of("irb140", cell=file))
+    drawn = np.vstack(drawing.vertices)
+    for obstacle in known:
+        apart = np.linalg.norm(drawn[:, None] - obstacle.vertices, axis=2).min(axis=0)
+        assert apart.max() < 1e-6, obstacle.name  # MuJoCo keeps single precision
+    bare = Drawing()
+    Bodies(bare, scene_of("irb140"))
+    assert sum(map(len, drawing.vertices)) > sum(map(len, bare.vertices))
+
+
+def test_what_is_drawn_is_what_is_known() -> None:
+    """Obstacles put into a scene come out of it again, beside its floor and pedestal."""
+    known = (
+        Obstacle.box("table", (0.8, 1.2, 0.05), (0.9, 0.1, 0.1)),
+        Obstacle("ramp", np.array([[1, 0, 0], [1, 0.4, 0], [1.4, 0, 0], [1.4, 0.4, 0.3]])),
+    )
+    found = known_obstacles(build_scene(ROBOT, people=(), furnish=furnished(known)))
+    here = {obstacle.name: obstacle.vertices for obstacle in found}
+    rng = np.random.default_rng(3)
+    for k, obstacle in enumerate(known):
+        for way in rng.normal(size=(200, 3)):  # convex hulls are equal if they reach equally far everywhere
+            assert np.isclose((here[f"known/{k}"] @ way).max(), (obstacle.vertices @ way).max(), atol=1e-6)
