@@ -175,7 +175,8 @@ class Station:
         """
         count = len(self.robot.tool_frames)
         given: dict[str, Any] = {"known": self.known, "spots": self.spots}
-        given |= {"activation": robot_activation(self.robot, count, count)} | parts
+        thresholds = self.robot.with_parameters(parts.get("parameters", "robot"))
+        given |= {"activation": robot_activation(thresholds, count, count)} | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
     def nominal(self, ticks: int) -> float:
