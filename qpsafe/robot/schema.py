@@ -132,7 +132,7 @@ class RobotFile(Table):
     home: list[Number]
     units: Units
     joints: Annotated[dict[str, JointLimits], pydantic.Field(min_length=1)]
-    hold: dict[str, Number] = {}
+    hold: dict[str, Number] = pydantic.Field(default_factory=dict)
     denavit_hartenberg: tuple[DenavitHartenberg, ...] = ()
     frames: Annotated[dict[str, Name], pydantic.Field(min_length=1)]
     wire: WireTable
@@ -142,7 +142,7 @@ class RobotFile(Table):
     recovery: RecoveryTable | None = None
     sensing: SensingTable | None = None
     gate: GateTable | None = None
-    regions: list[RegionTable] = []
+    regions: list[RegionTable] = pydantic.Field(default_factory=list)
     egm: EgmTable | None = None
 
     @pydantic.field_validator("tool", "denavit_hartenberg", mode="before")
