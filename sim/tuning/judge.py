@@ -119,7 +119,7 @@ def judge(
         plan: Of the search; its robot has the present values.
         tuned: Folder of the robot with the tuned values.
         encounters: How many.
-        out: Folder for the trials of both; None to keep them in memory only.
+        out: Where the trials of either get a folder, so that none is played twice; None to keep them in memory only.
         executor: Any of `concurrent.futures`, or Dask's; None for processes of our own.
         progress: Told how many are done, and of how many.
         workers: Processes, if there is no executor.
@@ -128,7 +128,7 @@ def judge(
     base = replace(plan, seed=seed, trials=encounters, lag=0.0, controllers=("default",))
     rows = []
     for k, one in enumerate((base, replace(base, robot=str(tuned)))):
-        folder = None if out is None else out / f"judge-{('present', 'tuned')[k]}"
+        folder = None if out is None else out / f"judge-{one.digest()[:8]}"
         heard = None if progress is None else _shifted(progress, k * encounters, 2 * encounters)
         rows.append(run_campaign(one, folder, executor, heard, workers=workers).columns)
     return compared(*rows, seed)

@@ -1,7 +1,7 @@
 """The search: batches of values, played through the same encounters as the present ones, few first, then all.
 
-Successive halving: all of a batch meet the first encounters; the more promising half goes on to more, a quarter to all
-and to servos with lag. Values that were stopped are told to the sampler by their paired estimate.
+Successive halving: all of a batch meet the first encounters; the more promising go on to more, one of them to all and
+to servos with lag. Values that were stopped are told to the sampler by their paired estimate.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Rungs(NamedTuple):
         lagged: Encounters with each of `LAGS`, on the last rung.
     """
 
-    encounters: tuple[int, ...] = (24, 72, 216)
-    goes_on: tuple[float, ...] = (0.5, 0.25)
+    encounters: tuple[int, ...] = (24, 96, 384)
+    goes_on: tuple[float, ...] = (0.375, 0.125)
     lagged: int = 12
 
 
