@@ -79,6 +79,8 @@ class SafetyController(Running):
             off, and so does `limits="off"`.
         separation: Speed and separation monitoring, above all tasks; none by default.
         recovery: How the robot returns to its path after danger.
+        parameters: "robot": what is not given here is as the robot's file states it, else the default; "paper": the
+            source's thresholds, and defaults beside them, whatever the file states.
 
     Raises:
         ConfigurationError: Names the argument that is wrong.
@@ -104,8 +106,9 @@ class SafetyController(Running):
         recovery: RecoveryRules | None = None,
         gate: VerifiedMotion | str | None = None,
         separation: SeparationLimit | None = None,
+        parameters: str = "robot",
     ) -> None:
-        self._robot = checked_robot("SafetyController", robot)
+        robot = self._robot = checked_robot("SafetyController", robot).with_parameters(parameters)
         self._dt = checked_dt("SafetyController", dt)
         self._labels = check_tasks(robot, tasks, self._dt)
         self._tasks = tuple(tasks)
@@ -115,7 +118,7 @@ class SafetyController(Running):
         self.evasion = evasion
         self.limits = limits
         self._spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
-        self._rules = SensingRules() if sensing is None else sensing
+        self._rules = SensingRules(**dict(robot.tuned.sensing)) if sensing is None else sensing
         check_surroundings(robot, self._rules, known, carried)
         self._sensing: DistanceSensing | None = None
         if self._spots is not None:
@@ -124,7 +127,9 @@ class SafetyController(Running):
         self.barrier, self.gate, self.separation = barrier, gate, separation
         self._known, self._carried = tuple(known), carried
         self.clearance = "off" if self._limits is None and clearance is None else clearance
-        self._recovery_rules = RecoveryRules() if recovery is None else checked_recovery(recovery)
+        self._recovery_rules = (
+            RecoveryRules(**dict(robot.tuned.recovery)) if recovery is None else checked_recovery(recovery)
+        )
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
         self._stages.sense(self._sensing, self._field, self._evasion)

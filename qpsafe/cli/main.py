@@ -23,6 +23,7 @@ from qpsafe.cli import (
     sick_sensors,
     story,
     stream,
+    tune,
     web,
 )
 from qpsafe.cli.campaign.app import app as campaigns
@@ -42,6 +43,7 @@ app.add_typer(demos, name="demo")
 app.add_typer(campaigns, name="campaign")
 app.command("compare")(compare.compare)
 app.add_typer(robots.app, name="robots")
+app.command("tune")(tune.tune)
 app.command("bench")(bench.bench)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)

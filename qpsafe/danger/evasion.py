@@ -137,7 +137,7 @@ class Evasion:
 
     @classmethod
     def for_robot(cls, robot: Robot, dt: float) -> Evasion:
-        """M and D from a robot's own limits and geometry; the default of a controller.
+        """M and D that the robot's file states, else from its own limits and geometry; the default of a controller.
 
         Let ℓ_j be the longest lever of joint j, the largest |(J_(i-1) + J_i)_j| over links and configurations: a danger
         Δ at one point causes a torque of at most Δ ℓ_j there, see (14), (15). Then
@@ -164,6 +164,8 @@ class Evasion:
         """
         from qpsafe.danger.thresholds import robot_thresholds
 
+        if robot.tuned.evasion is not None:
+            return cls(*robot.tuned.evasion, robot.nq, dt)
         torque = robot_thresholds(robot)[0].start * levers(robot)
         damping = float((torque / (SPEED_SHARE * robot.max_velocity)).max())
         mass = damping * TIME_SHARE * robot.max_velocity / robot.max_acceleration

@@ -115,10 +115,10 @@ def checked_field(field: Any) -> Any:
     return field
 
 
-def checked_gate(gate: VerifiedMotion | str | None) -> VerifiedMotion | None:
-    """Figures of the gate, the default ones for None; None where it is "off"."""
+def checked_gate(gate: VerifiedMotion | str | None, robot: Robot) -> VerifiedMotion | None:
+    """Figures of the gate, those of the robot's file or the default ones for None; None where it is "off"."""
     if gate is None:
-        return VerifiedMotion()
+        return VerifiedMotion(**dict(robot.tuned.gate))
     if isinstance(gate, str) and gate == "off":
         return None
     if not isinstance(gate, VerifiedMotion):

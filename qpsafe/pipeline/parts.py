@@ -184,7 +184,7 @@ class Parts:
 
     @gate.setter
     def gate(self, gate: VerifiedMotion | str | None) -> None:
-        self._gate = checked_gate(gate)
+        self._gate = checked_gate(gate, self._robot)
 
     @property
     def verifies(self) -> Gate | None:

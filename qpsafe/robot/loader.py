@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from qpsafe.robot.model_file import ModelFile, read_bundled, read_model
 from qpsafe.robot.package_model import find_package_model, is_package_model
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
-from qpsafe.robot.spec import DHChain, Region, RobotSpec, Tool
+from qpsafe.robot.spec import DHChain, Region, RobotSpec, Tool, Tuned
 
 _TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
 
@@ -38,6 +38,7 @@ def load_robot(
     max_acceleration: ArrayLike | None = None,
     home: ArrayLike | None = None,
     hold: Mapping[str, float] | None = None,
+    parameters: str = "robot",
 ) -> Robot:
     """Load a robot. Where a joint slides, limits are in m instead of rad.
 
@@ -54,6 +55,8 @@ def load_robot(
         home: Home pose for a bare model file, (n,) [rad]; if not given, the keyframe "home" of an MJCF, else zero,
             moved inside the limits.
         hold: Joints of a bare model file that are held in place, and where, e.g. ``{"finger": 0.02}`` [rad or m].
+        parameters: Of its controllers: "robot" for what its file states, "paper" for the source's, see
+            `Robot.with_parameters`.
 
     Returns:
         The robot; what is missing or doubtful in its files stands in `robot.notes` and is warned of (`RobotWarning`).
@@ -80,7 +83,7 @@ def load_robot(
         robot = Robot(spec_from_model(path, file, given), file.model)
     if robot.notes:
         warnings.warn(f"{robot.model_path.name}: " + "; ".join(robot.notes), RobotWarning, stacklevel=2)
-    return robot
+    return robot.with_parameters(parameters)
 
 
 def _bundled_folder() -> Path:
@@ -190,10 +193,26 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         tools=tuple(Tool(t.frame, t.mounted_on, m * np.array(t.offset), t.mass) for t in file.tool),
         chains=tuple(chains),
         danger=None if danger is None else ((danger.delta, danger.epsilon), (danger.delta_f, danger.epsilon_f)),
+        tuned=_tuned(file, names),
         regions=regions,
         held=model_file.held,
         hulls=model_file.hulls,
         external_joints=None if file.egm is None else tuple(file.egm.external),
+    )
+
+
+def _tuned(file: RobotFile, names: Sequence[str]) -> Tuned:
+    """The parameters of a controller that a file states, in SI and in the order of the model's joints."""
+    order, evasion = [list(file.joints).index(name) for name in names], None
+    if file.evasion is not None:
+        mass, damping = (tuple([values[k] for k in order]) for values in (file.evasion.mass, file.evasion.damping))
+        evasion = mass, damping
+    rad, m = file.units.radians, file.units.metres
+    units = {"speed": m, "angular_speed": rad, "joint_speed": rad, "approach": m}
+    tables = (file.recovery, file.sensing, file.gate)
+    stated = ({} if table is None else table.model_dump(exclude_none=True) for table in tables)
+    return Tuned(
+        evasion, *(tuple((key, units.get(key, 1.0) * value) for key, value in said.items()) for said in stated)
     )
 
 

@@ -16,7 +16,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.robot.kinematics import tree_of
 from qpsafe.robot.mjcf import ENDLESS
-from qpsafe.robot.spec import HeldJoint, Region, RobotSpec, Tool
+from qpsafe.robot.spec import HeldJoint, Region, RobotSpec, Tool, Tuned
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
 from qpsafe.text.words import counted
@@ -60,6 +60,7 @@ class Robot(Fixed):
         dh: The table (theta, d, a, alpha) of a robot with one, (n, 4), or None.
         dh_frames: Names of the frames of that table.
         danger: (Δ, ε) and (Δ_f, ε_f) as the robot's file states them, or None.
+        tuned: Other parameters of a controller that its file states, see `qpsafe tune`.
         notes: What is missing or doubtful in the robot's files, in words; empty if all is well.
         spots_path: File of the distance sensors, or None where there is none.
         regions: Parts of the surface that may carry distance sensors.
@@ -94,6 +95,7 @@ class Robot(Fixed):
         self.dh = _read_only(spec.chains[0].table) if len(spec.chains) == 1 else None
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
+        self.tuned: Tuned = spec.tuned
         self.notes = spec.notes
         self._held = spec.held
         self.hulls = spec.hulls
@@ -125,6 +127,21 @@ class Robot(Fixed):
     def __repr__(self) -> str:
         size = f"{counted(self.nq, 'joint')}, {counted(len(self.wire_frames), 'wire link')}"
         return f"Robot({self.name!r}, {size}, {self.model_path.name})"
+
+    def with_parameters(self, parameters: str) -> Robot:
+        """The same robot with the parameters of its file, or with none of them.
+
+        Args:
+            parameters: "robot": itself. "paper": the source's thresholds, carried over by the rule of
+                `qpsafe.danger.thresholds`; evasion, recovery, sensing and gate as where a file states none.
+        """
+        if parameters not in ("robot", "paper"):
+            raise ConfigurationError("load_robot", "parameters", parameters, '"robot" or "paper"')
+        if parameters == "robot" or (self.danger is None and self.tuned == Tuned()):
+            return self
+        other = copy(self)
+        other.__dict__ |= {"danger": None, "tuned": Tuned()}
+        return other
 
     def with_spots(self, file: str | Path | None) -> Robot:
         """The same robot with the distance sensors of another file.

@@ -17,23 +17,24 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from qpsafe.errors import RobotFileError
+from qpsafe.robot.parameter_tables import (
+    DangerTable,
+    EvasionTable,
+    GateTable,
+    Number,
+    Positive,
+    RecoveryTable,
+    SensingTable,
+    Table,
+)
 from qpsafe.text.toml_parse import read_bounded, toml_table
 from qpsafe.text.words import counted
 
-Number = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0)]
-Fraction = Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, gt=0, lt=1)]
 Name = Annotated[str, pydantic.Field(strict=True, min_length=1)]
 Pair = Annotated[list[Name], pydantic.Field(min_length=2, max_length=2)]
 
 
-class _Table(pydantic.BaseModel):
-    """A TOML table in which an unknown key is an error."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class Units(_Table):
+class Units(Table):
     """Units of the figures in the file; they must be stated, none has a default."""
 
     length: Literal["m", "mm"]
@@ -52,7 +53,7 @@ class Units(_Table):
         return {"rad": 1.0, "deg": math.pi / 180.0}[self.angle]
 
 
-class JointLimits(_Table):
+class JointLimits(Table):
     """Limits of one joint: angle, angle per time, angle per time squared; length where it slides."""
 
     lower: Number
@@ -61,7 +62,7 @@ class JointLimits(_Table):
     max_acceleration: Positive
 
 
-class DHRow(_Table):
+class DHRow(Table):
     """One row of a standard Denavit-Hartenberg table: T = Rz(q + theta) Tz(d) Tx(a) Rx(alpha)."""
 
     theta: Number
@@ -70,7 +71,7 @@ class DHRow(_Table):
     alpha: Number
 
 
-class DenavitHartenberg(_Table):
+class DenavitHartenberg(Table):
     """The table, one row a joint, the frames it leads to, one more than rows, and its joints if these are not all."""
 
     frames: list[Name]
@@ -78,7 +79,7 @@ class DenavitHartenberg(_Table):
     joints: list[Name] | None = None
 
 
-class WireTable(_Table):
+class WireTable(Table):
     """Segments of the wire model as pairs of frame names."""
 
     links: Annotated[
@@ -86,7 +87,7 @@ class WireTable(_Table):
     ]
 
 
-class ToolTable(_Table):
+class ToolTable(Table):
     """The mounted tool: its tip's frame, the frame it is mounted on, the tip's place in that frame, its mass."""
 
     frame: Name
@@ -95,16 +96,7 @@ class ToolTable(_Table):
     mass: Annotated[float, pydantic.Field(strict=True, allow_inf_nan=False, ge=0)]
 
 
-class DangerTable(_Table):
-    """Thresholds of the danger field for this robot: Δ, ε of eq. (19) and Δ_f, ε_f of eq. (21)."""
-
-    delta: Positive
-    epsilon: Fraction
-    delta_f: Positive
-    epsilon_f: Fraction
-
-
-class RegionTable(_Table):
+class RegionTable(Table):
     """A part of the surface that may carry sensors: what lies in a box, in the frame of the link that carries them.
 
     `link` counts wire links from 1. `frame` is the Denavit-Hartenberg frame of the link if it is not given. `mesh` is a
@@ -123,13 +115,13 @@ class RegionTable(_Table):
     self_sight: Annotated[float, pydantic.Field(strict=True, ge=0.0, le=1.0)] = 0.02
 
 
-class EgmTable(_Table):
+class EgmTable(Table):
     """Of the wire to an ABB controller: joints that it takes for external ones, in its order, e.g. a seventh axis."""
 
     external: list[Name]
 
 
-class RobotFile(_Table):
+class RobotFile(Table):
     """A whole `robot.toml`, in the units of the file."""
 
     name: Name
@@ -140,13 +132,17 @@ class RobotFile(_Table):
     home: list[Number]
     units: Units
     joints: Annotated[dict[str, JointLimits], pydantic.Field(min_length=1)]
-    hold: dict[str, Number] = {}
+    hold: dict[str, Number] = pydantic.Field(default_factory=dict)
     denavit_hartenberg: tuple[DenavitHartenberg, ...] = ()
     frames: Annotated[dict[str, Name], pydantic.Field(min_length=1)]
     wire: WireTable
     tool: tuple[ToolTable, ...] = ()
     danger: DangerTable | None = None
-    regions: list[RegionTable] = []
+    evasion: EvasionTable | None = None
+    recovery: RecoveryTable | None = None
+    sensing: SensingTable | None = None
+    gate: GateTable | None = None
+    regions: list[RegionTable] = pydantic.Field(default_factory=list)
     egm: EgmTable | None = None
 
     @pydantic.field_validator("tool", "denavit_hartenberg", mode="before")
@@ -225,6 +221,9 @@ def check(path: Path, file: RobotFile) -> None:
     if danger is not None and danger.delta_f * (1.0 + danger.epsilon_f) > danger.delta * (1.0 - danger.epsilon):
         expected = "delta_f (1 + epsilon_f) <= delta (1 - epsilon), or two levels of Table I overlap"
         raise RobotFileError(path, "danger.delta_f", danger.delta_f, expected)
+    for key, values in () if file.evasion is None else sorted(file.evasion):
+        if len(values) != len(file.joints):
+            raise RobotFileError(path, f"evasion.{key}", values, f"{len(file.joints)} values, one a joint")
     for name in () if file.egm is None else file.egm.external:
         if name not in file.joints:
             raise RobotFileError(path, "egm.external", name, "one of the joints: " + ", ".join(file.joints))

@@ -44,6 +44,26 @@ class DHChain(NamedTuple):
     joints: tuple[int, ...]
 
 
+#: Names and values.
+Stated = tuple[tuple[str, float], ...]
+
+
+class Tuned(NamedTuple):
+    """Parameters of a controller that a robot's file states, SI; empty where it leaves them to the defaults.
+
+    Attributes:
+        evasion: M and D, both (n,).
+        recovery: Of `RecoveryRules`.
+        sensing: Of `SensingRules`.
+        gate: Of `VerifiedMotion`.
+    """
+
+    evasion: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    recovery: Stated = ()
+    sensing: Stated = ()
+    gate: Stated = ()
+
+
 class Region(NamedTuple):
     """A part of the surface that may carry distance sensors, section III.
 
@@ -90,6 +110,7 @@ class RobotSpec:
         tools: The mounted tools, one an arm; none where the file names none.
         chains: Published Denavit-Hartenberg tables, one an arm; none where the file has none.
         danger: (Δ, ε) and (Δ_f, ε_f) of this robot, or None: then by the rule of `qpsafe.danger.thresholds`.
+        tuned: Other parameters that its file states, see `qpsafe tune`.
         notes: What is missing or doubtful in the robot's files, in words.
         spots_path: File of distance sensors, or None where there is none.
         manufacturer: Who makes it.
@@ -114,6 +135,7 @@ class RobotSpec:
     tools: tuple[Tool, ...] = ()
     chains: tuple[DHChain, ...] = ()
     danger: tuple[tuple[float, float], tuple[float, float]] | None = None
+    tuned: Tuned = field(default_factory=Tuned)
     notes: tuple[str, ...] = ()
     spots_path: Path | None = None
     manufacturer: str = ""

@@ -62,7 +62,7 @@ def meeting(plan: Plan, what: int | Case) -> Meeting:
         u = model.random(seed)
     else:
         trial, seed, motion, u = -1, plan.seed, what.motion, np.array(what.u)
-    place = station(plan.robot, motion, plan.lag, plan.sensor)
+    place = station(plan.robot, motion, plan.lag, plan.sensor, plan.cell)
     story = model.encounter(u, place.floor_plan)
     assert story.duration is not None
     return Meeting(trial, seed, place, story, story.track(np.arange(0.0, story.duration, DT)))

@@ -54,6 +54,7 @@ class Plan:
         sensor: One of `SENSORS`, by which all controllers see that do not say otherwise.
         lag: Delay of the servos, in whole ticks, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
+        cell: A TOML file of furniture, see `qpsafe.sensing.cell_file`, besides the robot's pedestal; None for none.
         trials: How many.
         seed: Of the first trial; that of trial k is seed + k.
     """
@@ -64,6 +65,7 @@ class Plan:
     sensor: str = "ideal"
     lag: float = 0.0
     people: str | None = None
+    cell: str | None = None
     trials: int = FULL
     seed: int = 0
 
@@ -90,6 +92,8 @@ class Plan:
             raise ConfigurationError(
                 "Plan", "people", self.people, "a TOML file, or a folder of stories, that is there"
             )
+        if self.cell is not None and not Path(self.cell).is_file():
+            raise ConfigurationError("Plan", "cell", self.cell, "a TOML file of furniture that is there")
         for name in self.controllers:
             _check_controller(name)
 
@@ -105,7 +109,11 @@ class Plan:
         """What decides a trial's rows: the plan but for its length, contents of its files, and the code's digest."""
         named = self.to_dict()
         del named["trials"]
-        files = [path for path in (self.robot, *self.motions, self.people or "") if path and Path(path).exists()]
+        files = [
+            path
+            for path in (self.robot, *self.motions, self.people or "", self.cell or "")
+            if path and Path(path).exists()
+        ]
         for name in self.controllers:
             place = name.removesuffix(PERFECT).rpartition(":")[0]
             if place:  # a user's own
@@ -152,6 +160,7 @@ class PlanFile(BaseModel):
     sensor: Sight = "ideal"
     lag: Annotated[float, Field(strict=True)] = Plan.lag
     people: _Word | None = None
+    cell: _Word | None = None
     trials: _Whole = Plan.trials
     seed: _Whole = Plan.seed
 
@@ -170,8 +179,9 @@ def parse_plan(text: TomlText, folder: Path = Path()) -> Plan:
     said = text.checked(PlanFile)
     tables = said.model_dump() | {"motions": tuple(said.motions), "controllers": tuple(said.controllers)}
     tables["motions"] = tuple(str(folder / name) if name.endswith(".toml") else name for name in said.motions)
-    if said.people is not None:
-        tables["people"] = str(folder / said.people)
+    for key in ("people", "cell"):
+        if tables[key] is not None:
+            tables[key] = str(folder / tables[key])
     if (folder / said.robot).exists():
         tables["robot"] = str(folder / said.robot)
     try:

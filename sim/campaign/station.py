@@ -16,6 +16,7 @@ from qpsafe.danger.separation import Separation
 from qpsafe.danger.thresholds import robot_activation
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
+from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.campaign.servo import OMEGA
@@ -25,6 +26,7 @@ from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.for_robot import line_for
 from qpsafe.sim.experiments.pick_place.cell import Cell
 from qpsafe.sim.experiments.pick_place.for_robot import work_for
+from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.orientation import OrientationTask
@@ -59,12 +61,14 @@ class Station:
         robot: The robot, with spots.
         lag: Of its servos [s].
         sensor: ``ideal``, ``sharp`` or ``perfect``.
+        furniture: A cell's TOML file, None for none.
     """
 
     motion: str
     robot: Robot
     lag: float = 0.0
     sensor: str = "ideal"
+    furniture: str | None = None
 
     @cached_property
     def cell(self) -> Cell | None:
@@ -79,8 +83,13 @@ class Station:
     @cached_property
     def scene(self) -> Scene:
         """The world without people."""
-        furnish = None if self.cell is None else self.cell.furnish
-        return build_scene(self.robot, pedestal=self.pedestal, people=(), furnish=furnish)
+        return build_scene(self.robot, pedestal=self.pedestal, people=(), furnish=self._furnish)
+
+    def _furnish(self, spec: Any) -> None:
+        if self.cell is not None:
+            self.cell.furnish(spec)
+        if self.furniture is not None:
+            add_obstacles(spec, load_cell(self.furniture))
 
     @cached_property
     def world(self) -> World:
@@ -175,7 +184,8 @@ class Station:
         """
         count = len(self.robot.tool_frames)
         given: dict[str, Any] = {"known": self.known, "spots": self.spots}
-        given |= {"activation": robot_activation(self.robot, count, count)} | parts
+        thresholds = self.robot.with_parameters(parts.get("parameters", "robot"))
+        given |= {"activation": robot_activation(thresholds, count, count)} | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
 
     def nominal(self, ticks: int) -> float:
@@ -265,7 +275,7 @@ def _stop(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
 
 
 @cache
-def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal") -> Station:
+def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", cell: str | None = None) -> Station:
     """The station of a robot and a motion, built once a process.
 
     Args:
@@ -273,13 +283,14 @@ def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal") ->
         motion: One of `MOTIONS`, or the path of a program.
         lag: Of the servos [s].
         sensor: ``ideal``, ``sharp`` or ``perfect``.
+        cell: A TOML file of furniture, None for none.
 
     Raises:
         ConfigurationError: The robot has no spots, or cannot do the motion.
     """
     if motion not in MOTIONS and not Path(motion).is_file():
         raise ConfigurationError("campaign", "motions", motion, f"one of {', '.join(MOTIONS)}, or a program's file")
-    found = Station(motion, load_robot(robot), lag, sensor)
+    found = Station(motion, load_robot(robot), lag, sensor, cell)
     if found.robot.spots_path is None:
         raise ConfigurationError("campaign", "robot", robot, "a robot with distance sensors (spots.toml)")
     found.start  # noqa: B018  a program that the robot cannot follow is refused now

@@ -15,6 +15,7 @@ from qpsafe.sim.campaign.recording import Observer, Recording, record
 from qpsafe.sim.campaign.senses import Senses
 
 if TYPE_CHECKING:
+    from qpsafe.sim.campaign.opponents.registry import Opponent
     from qpsafe.sim.campaign.plan import Plan
 
 PERFECT_SIGHT = "perfect"  # the plan's sensor that tells everybody where people are
@@ -52,7 +53,19 @@ def recorded(plan: Plan, met: Meeting, name: str, observer: Observer | None = No
         name: Of the controller.
         observer: Called after every tick, see `record`; then nothing is compiled as a whole.
     """
-    entry, senses = opponent(name), Senses(met.station, met.tracks, plan.sensor, met.seed)
+    return recorded_by(plan, met, opponent(name), observer)
+
+
+def recorded_by(plan: Plan, met: Meeting, entry: Opponent, observer: Observer | None = None) -> Recording:
+    """The run of a controller that need not be one of the registry's.
+
+    Args:
+        plan: The campaign.
+        met: The encounter.
+        entry: The controller.
+        observer: See `recorded`.
+    """
+    senses = Senses(met.station, met.tracks, plan.sensor, met.seed)
     if plan.sensor == PERFECT_SIGHT and entry.sight == SPOTS:
         entry = entry._replace(sight=POINTS)
     ticks = len(met.tracks)

@@ -143,7 +143,7 @@ class World:
             layout.describe(numbers, kind, place, model.geom_size[g], points)
         hulls, *rays = joined(meshes)
         tables = hulls._asdict() | dict(zip(("boxes", "nodes", "triangles"), rays, strict=True))
-        boxes = (index[:, layout.BODY] == 0) & (index[:, layout.KIND] == layout.BOX)
+        solid = (index[:, layout.KIND] == layout.BOX) | (index[:, layout.KIND] == layout.MESH)
         scenery = model.geom_group[geoms] == SCENERY
         pedestal = np.array([model.geom(g).name.startswith("pedestal") for g in geoms], dtype=bool)
         return cls(
@@ -153,7 +153,7 @@ class World:
             shapes=frozen(shapes),
             **{name: frozen(table, table.dtype) for name, table in tables.items()},
             robot=frozen(np.flatnonzero(~scenery), np.int64),
-            furniture=frozen(np.flatnonzero(scenery & boxes & ~pedestal), np.int64),
+            furniture=frozen(np.flatnonzero(scenery & (index[:, layout.BODY] == 0) & solid & ~pedestal), np.int64),
             floors=frozen(np.flatnonzero(index[:, layout.KIND] == layout.PLANE), np.int64),
             movable=frozen(loose if movable else [], np.int64),
             bodies=scene.robot.nq + 1 + (len(loose) if movable else 0),

@@ -56,6 +56,11 @@ def known_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
                 found.append(box)
             else:
                 bodies.setdefault(model.body(body).name, []).append(box.vertices)
+        elif shape == kind.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            vertices = np.asarray(model.mesh_vert[first : first + count], dtype=float)
+            found.append(Obstacle(name, vertices @ pose[:3, :3].T + pose[:3, 3]))
         elif shape == kind.mjGEOM_CYLINDER:
             angle = np.pi * np.arange(48) / 24
             outer = size[0] / np.cos(np.pi / 48)

@@ -45,6 +45,7 @@ PLAN = {
     "people": Annotated[
         Path | None, typer.Option(help="TOML file with a model of people or a story, or a folder of these.")
     ],
+    "cell": Annotated[Path | None, typer.Option(help="TOML file of furniture in the cell.")],
 }
 #: What was typed of them, by the plan's keys; None for what was not.
 Typed = dict[str, Any]
@@ -67,11 +68,12 @@ def planned(command: Callable[..., None]) -> Callable[..., None]:
     return whole
 
 
-def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
+def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given: Any) -> Plan:
     """A plan, that of a file, or the default one, with options in the place of what it says.
 
     Args:
         file: The plan, or its file; None for the default one.
+        where: The command, for the error.
         given: Keys of the plan; None where nothing was typed; several names in one word, separated by commas.
 
     Raises:
@@ -85,18 +87,19 @@ def make_plan(file: Path | Plan | None, **given: Any) -> Plan:
     for key in ("motions", "controllers"):
         if key in typed:
             typed[key] = tuple(word.strip() for word in typed[key].split(","))
-    if "people" in typed:
-        typed["people"] = str(typed["people"])
+    for key in ("people", "cell"):
+        if key in typed:
+            typed[key] = str(typed[key])
     try:
         made = replace(plan, **typed)
     except ConfigurationError as wrong:
-        raise ConfigurationError("qpsafe campaign", f"--{wrong.key}", wrong.value, wrong.expected) from None
+        raise ConfigurationError(where, f"--{wrong.key}", wrong.value, wrong.expected) from None
     if find_robot(made.robot).suffix != ".toml":  # a bare model: a folder is made for it
-        ready = any_robot("qpsafe campaign", made.robot, own_folder(made.robot), console(True))
+        ready = any_robot(where, made.robot, own_folder(made.robot), console(True))
         made = replace(made, robot=str(ready.folder))
     if load_robot(made.robot).spots_path is None:
         expected = "a robot with distance sensors (spots.toml)"
-        raise ConfigurationError("qpsafe campaign", "--robot", made.robot, expected)
+        raise ConfigurationError(where, "--robot", made.robot, expected)
     return made
 
 

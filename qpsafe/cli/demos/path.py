@@ -114,8 +114,8 @@ def path(
         checks, left_out = [check for check in checks if "largest step" in check.name], []
     result = to_dict(found, checks, left_out) | {"encounters": {name: item.to_dict() for name, item in near.items()}}
     title = f"Second experiment, {machine.name}, hierarchical law, strict projection"
-    figure_11(runs["strict"].log, out / "figure.png", title, robot_activation(machine))
-    side_by_side({name: run for name, run in runs.items() if "," not in name}, machine, out / "side-by-side.png")
+    figure_11(runs["strict"].log, out / "figure.png", title, robot_activation(first.robot))
+    side_by_side({name: run for name, run in runs.items() if "," not in name}, first.robot, out / "side-by-side.png")
     write_text(out / "report.json", json_text(result) + "\n")
     if json:
         print_json(result)

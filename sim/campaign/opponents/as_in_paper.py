@@ -10,5 +10,5 @@ from qpsafe.sensing.rules import SensingRules
 #: Arguments of `SafetyController`: no gate, and nothing is kept clear of.
 AS_IN_PAPER: dict[str, Any] = {
     "evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper(), "gate": "off",
-    "clearance": "off",
+    "clearance": "off", "parameters": "paper",
 }  # fmt: skip

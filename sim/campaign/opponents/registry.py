@@ -76,7 +76,9 @@ def _with(law: Any = None, **parts: Any) -> Callable[[Station], SafetyController
 
 
 def _capped(station: Station) -> SafetyController:
-    high = robot_thresholds(station.robot)[0]  # the cap of docs/explanation/barrier.md, 9.5 on the IRB 140
+    high = robot_thresholds(station.robot.with_parameters("paper"))[
+        0
+    ]  # the cap of docs/explanation/barrier.md, 9.5 on the IRB 140
     return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **AS_IN_PAPER)
 
 

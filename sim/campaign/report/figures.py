@@ -49,14 +49,14 @@ def harm_figure(controllers: dict[str, dict[str, Any]]) -> Figure:
     Args:
         controllers: Of a summary.
     """
-    figure, axes = _figure(1, 2, 7.6, 3.7)
+    figure, axes = panels(1, 2, 7.6, 3.7)
     for axis, (name, label) in zip(axes, _HARMS, strict=True):
         for who, colour in colours(controllers).items():
             _box(axis, controllers[who], name, colour, plain(who))
         axis.set(xlabel="cycle time / undisturbed cycle time", ylabel=label)
         axis.set_ylim(0.0, None)
         axis.margins(x=0.08)
-    _legend_below(figure, axes[0], 4)
+    legend_below(figure, axes[0], 4)
     return figure
 
 
@@ -84,7 +84,7 @@ def distance_figure(rows: dict[str, Columns]) -> Figure:
     Args:
         rows: Of each controller.
     """
-    figure, (axis,) = _figure(1, 1, 7.6, 3.4)
+    figure, (axis,) = panels(1, 1, 7.6, 3.4)
     for name, colour in colours(rows).items():
         levels = np.quantile(1e3 * rows[name]["distance"], _POINTS, method="inverted_cdf")
         axis.plot(levels, 100.0 * _POINTS, color=colour, linewidth=1.3, label=plain(name), drawstyle="steps-post")
@@ -92,7 +92,7 @@ def distance_figure(rows: dict[str, Columns]) -> Figure:
     axis.set(xlabel="smallest distance of a trial [mm]; contact at 0", ylabel="share of trials with less [%]")
     axis.set_ylim(0.0, 100.0)
     axis.set_xlim(-50.0, max(float(np.quantile(1e3 * mine["distance"], 0.95)) for mine in rows.values()) + 50.0)
-    _legend_below(figure, axis, 4)
+    legend_below(figure, axis, 4)
     return figure
 
 
@@ -104,7 +104,7 @@ def energy_figure(rows: dict[str, Columns]) -> Figure:
     """
     from matplotlib.ticker import LogLocator
 
-    figure, axes = _figure(1, 2, 7.6, 3.4)
+    figure, axes = panels(1, 2, 7.6, 3.4)
     labels = ("energy of the contact [J]", "energy / limit of the touched region")
     for axis, key, label in zip(axes, ("energy", "energy_share"), labels, strict=True):
         for name, colour in colours(rows).items():
@@ -121,7 +121,7 @@ def energy_figure(rows: dict[str, Columns]) -> Figure:
                 scale.set_major_formatter("{x:g}")
                 scale.set_minor_formatter("")
     axes[1].axvline(1.0, color="#c0392b", linewidth=0.8)
-    _legend_below(figure, axes[0], 4)
+    legend_below(figure, axes[0], 4)
     return figure
 
 
@@ -132,7 +132,7 @@ def kinds_figure(controllers: dict[str, dict[str, Any]]) -> Figure:
         controllers: Of a summary.
     """
     names = list(controllers)
-    figure, axes = _figure(1, 2, 7.6, 1.3 + 0.28 * len(names))
+    figure, axes = panels(1, 2, 7.6, 1.3 + 0.28 * len(names))
     parts = (
         (axes[0], "classes", _KINDS, "robot, one tick before"),
         (axes[1], "seen", {"seen": "#7fb3d5", "unseen": "#5d4a66"}, "touched part"),
@@ -151,8 +151,15 @@ def kinds_figure(controllers: dict[str, dict[str, Any]]) -> Figure:
     return figure
 
 
-def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Sequence[Axes]]:
-    """A figure that no window system knows of, in the style of all others."""
+def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Sequence[Axes]]:
+    """A figure that no window system knows of, in the style of all others.
+
+    Args:
+        rows: Of axes.
+        columns: Of axes.
+        width: [inch].
+        height: [inch].
+    """
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -161,7 +168,14 @@ def _figure(rows: int, columns: int, width: float, height: float) -> tuple[Figur
         return figure, figure.subplots(rows, columns, squeeze=False).ravel().tolist()
 
 
-def _legend_below(figure: Figure, axis: Axes, columns: int) -> None:
+def legend_below(figure: Figure, axis: Axes, columns: int) -> None:
+    """A legend under a figure.
+
+    Args:
+        figure: Whose.
+        axis: Whose curves and points.
+        columns: Of the legend.
+    """
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)
 
 

@@ -29,9 +29,9 @@ class FixedSettings(Control):
     """Everything that defines one run; equal settings give bit-identical logs (wall times aside). Tasks, thresholds,
     evasion and metrics of one's own are those of `Control`.
 
-    With the choreography, which shows Table I, evasion, sensing and recovery are the paper's unless they are given:
-    people count as standing still, so that levels of danger are passed one by one. With a story they are the
-    controller's default.
+    With the choreography, which shows Table I, thresholds, evasion, sensing and recovery are the paper's unless they
+    are given, whatever the robot's file states: people count as standing still, so that levels of danger are passed one
+    by one. With a story they are the controller's default.
 
     Attributes:
         robot: The robot, with spots.
@@ -64,6 +64,8 @@ class FixedSettings(Control):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.story is None:
+            self.robot = self.robot.with_parameters("paper")
         if self.robot.spots_path is None and self.sensor != "perfect":
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:

@@ -1,0 +1,114 @@
+"""What a search has done so far, as lines of JSON: the first says what is searched, each other one holds a batch.
+
+A line is on the disk before the next batch begins; what a killed process left half written is cut off. A batch that is
+not there is played again, and gives the same.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.tuning.objectives import Played
+from qpsafe.sim.tuning.trial import Trial, played_from_dict, played_to_dict
+from qpsafe.text.json_text import json_text
+
+FORMAT = "qpsafe tuning 1"
+
+
+class Journal:
+    """A file of finished batches.
+
+    Args:
+        path: The file; made with its folder if it is not there. None keeps all in memory.
+        identity: What is searched, for JSON: a file of another search is refused.
+
+    Raises:
+        ConfigurationError: The file is of another search or of other code, or is none.
+    """
+
+    def __init__(self, path: Path | None, identity: Mapping[str, Any]) -> None:
+        self._path = path
+        self.trials: list[Trial] = []
+        #: Outcomes of the present values; None as long as they have not been played.
+        self.reference: Played | None = None
+        #: Processor time of all batches [s].
+        self.seconds = 0.0
+        said = json.loads(json_text({"format": FORMAT, "identity": identity}))
+        if path is None:
+            return
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._write(said)
+            return
+        lines = _whole_lines(path)
+        there = _parsed(path, lines[0]) if lines else said
+        if there.get("format") != FORMAT:
+            raise ConfigurationError(path, "format", there.get("format"), f"{FORMAT!r}: the journal of a tuning")
+        for key, value in said["identity"].items():
+            if there["identity"].get(key) != value:
+                expected = f"{value!r}, as now: another search needs another folder"
+                raise ConfigurationError(path, key, there["identity"].get(key), expected)
+        if not lines:
+            self._write(said)
+        for line in lines[1:]:
+            self._take(_parsed(path, line))
+
+    @property
+    def batches(self) -> int:
+        """How many are finished, with that of the present values."""
+        return 1 + max((trial.batch for trial in self.trials), default=-1)
+
+    def keep(self, trials: Sequence[Trial], seconds: float, reference: Played | None = None) -> None:
+        """Add a finished batch.
+
+        Args:
+            trials: Of it.
+            seconds: That processes spent on it.
+            reference: Outcomes of the present values, with their batch.
+        """
+        line = {"trials": [trial.to_dict() for trial in trials], "seconds": seconds}
+        if reference is not None:
+            line["reference"] = played_to_dict(reference)
+        if self._path is not None:
+            self._write(line)
+        self._take(json.loads(json_text(line)))
+
+    def _take(self, line: Mapping[str, Any]) -> None:
+        self.trials += [Trial.from_dict(said) for said in line["trials"]]
+        self.seconds += line["seconds"]
+        if "reference" in line:
+            self.reference = played_from_dict(line["reference"])
+
+    def _write(self, line: Mapping[str, Any]) -> None:
+        assert self._path is not None
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json_text(line, indent=None) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _whole_lines(path: Path) -> list[str]:
+    """The lines of a file; what comes after the last end of a line is cut off, in the file too."""
+    try:
+        data = path.read_bytes()
+        end = data.rfind(b"\n") + 1
+        if end < len(data):
+            with path.open("r+b") as file:
+                file.truncate(end)
+        return data[:end].decode().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(path, "file", str(error), "the journal of a tuning") from None
+
+
+def _parsed(path: Path, line: str) -> dict[str, Any]:
+    try:
+        said = json.loads(line)
+        assert isinstance(said, dict)
+        return said
+    except (ValueError, AssertionError):
+        raise ConfigurationError(path, "line", line[:60], "a line of JSON, as a tuning writes them") from None
