@@ -44,7 +44,12 @@ def main() -> None:
     tell("in one process, one cycle of delay built in", late)
     print(f"lock-step, {seen.counts['answered']} answers: largest difference {exact.largest:.3g} rad")
     tell("lock-step", wire)
-    content: dict[str, Any] = {"lock_step": exact._asdict(), "one_process": fate(here), "one_process_late": fate(late)}
+    content: dict[str, Any] = {
+        "experiment": name,
+        "lock_step": exact._asdict() | {"answers": seen.counts["answered"]} | fate(wire),
+        "one_process": fate(here),
+        "one_process_late": agreement(late.q, here.q)._asdict() | fate(late),
+    }
     if not arguments.only_lock_step:
         if arguments.real_time:
             print(fifo(70).line)

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
 from qpsafe.sim.campaign.report.markdown import filled
 
 DOCS = Path(__file__).resolve().parent
+sys.path.append(str(DOCS))
+
+import demo_tables  # noqa: E402
+
 #: Pages, and the campaign each is filled from.
 PAGES = {
     DOCS / "explanation" / "campaign.md": "campaign",
@@ -18,6 +23,12 @@ PAGES = {
     DOCS / "how-to" / "coming-from.md": "campaign",
     DOCS / "how-to" / "placement.md": "campaign",
     DOCS / "explanation" / "demo-fixed.md": "campaign",
+    DOCS / "explanation" / "demo-path.md": "campaign",
+    DOCS / "explanation" / "compare.md": "campaign",
+    DOCS / "explanation" / "hierarchical-qp.md": "campaign",
+    DOCS / "explanation" / "one-tick.md": "campaign",
+    DOCS / "how-to" / "stories.md": "campaign",
+    DOCS / "how-to" / "stream.md": "campaign",
 }
 DATA = DOCS / "data" / "campaign.json"
 
@@ -144,7 +155,7 @@ def gained() -> str:
     return "\n".join([*head, f"| orientation released in medium danger (> 0.05 rad) | {released} |", *distances()])
 
 
-TABLES = {"worst": worst, "engine": engine, "peers": peers, "fixed": fixed, "gained": gained}
+TABLES = {"worst": worst, "engine": engine, "peers": peers, "fixed": fixed, "gained": gained, **demo_tables.TABLES}
 
 
 def made(text: str, campaign: str = "campaign") -> str:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.people.ahead import PosesAhead
-from qpsafe.sim.people.person import Person, PersonPose
+from qpsafe.sim.people.person import Foot, Person, PersonPose
 from qpsafe.sim.people.posture import HANG, Arm, Posture
 from qpsafe.sim.stories.story import Story
+from qpsafe.sim.web.stride import Stride
 
 Array = NDArray[np.float64]
 
@@ -60,6 +61,7 @@ class Crowd:
         self._tick = -1
         self._stooped: tuple[Array, Posture] | None = None
         self._seen: tuple[str, Array, PersonPose] | None = None
+        self._stride, self._jumped = Stride(self._person, dt), True
 
     def want(self, drag: Drag) -> None:
         """Follow another wish from the next tick on.
@@ -75,7 +77,7 @@ class Crowd:
         if not 0.0 < drag.speed <= QUICKEST:
             raise ConfigurationError("Drag", "speed", drag.speed, f"above 0 and at most {QUICKEST:g} m/s")
         if drag.mode != self.drag.mode:  # somebody appears, or turns from feet to a hand: no way between them
-            self.place = place
+            self.place, self._jumped = place, True
         self.drag = drag
 
     def __call__(self, tick: int) -> Sequence[PersonPose]:
@@ -86,21 +88,26 @@ class Crowd:
             far, most = float(np.sqrt(way @ way)), self.drag.speed * self._dt
             self.place = self.place + (way if far <= most else way * (most / far))
         seen = self._seen
-        if seen is None or seen[0] != self.drag.mode or not np.array_equal(seen[1], self.place):
+        still = seen is not None and seen[0] == self.drag.mode and np.array_equal(seen[1], self.place)
+        if seen is None or not (still and self._stride.resting):
             seen = self._seen = self.drag.mode, self.place, self._dragged()
         return (seen[2], *self._others(tick % self._length))
 
     def _dragged(self) -> PersonPose:
         mode, (x, y, _) = self.drag.mode, self.place
         if mode == AWAY:
+            self._jumped = True
             return self._person.pose(float(FAR[0]), float(FAR[1]), 0.0)
         heading = math.atan2(-y, -x)  # towards the robot
-        if mode == PERSON or self._person.board is not None:
-            return self._person.pose(float(x), float(y), heading)
-        c, s = math.cos(heading), math.sin(heading)
-        # the root stands so that the hand is AHEAD of it and RIGHT of its middle
-        root = float(x - AHEAD * c - RIGHT * s), float(y - AHEAD * s + RIGHT * c)
-        return self._person.pose(*root, heading, posture=self._reaching())
+        posture = None
+        if mode == HAND and self._person.board is None:
+            c, s = math.cos(heading), math.sin(heading)
+            # the root stands so that the hand is AHEAD of it and RIGHT of its middle
+            x, y = float(x - AHEAD * c - RIGHT * s), float(y - AHEAD * s + RIGHT * c)
+            posture = self._reaching()
+        left, right = self._stride(np.array([x, y, heading]), stepping=not self._jumped).tolist()
+        self._jumped = False
+        return self._person.pose(float(x), float(y), heading, (Foot(*left), Foot(*right)), posture)
 
     def _reaching(self) -> Posture:
         """The right hand at its place, with the least stoop."""

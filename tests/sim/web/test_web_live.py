@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from qpsafe.sim.recording.run_file import read_run
 from qpsafe.sim.replay.replay import replay
 from qpsafe.sim.web.live import Live, Wish
 from qpsafe.sim.web.people import AWAY, HAND, PERSON, Drag
-from qpsafe.sim.web.setup import MOVE, RANDOM, STRAIGHT, Setup
+from qpsafe.sim.web.setup import DT, MOVE, RANDOM, STRAIGHT, Setup
 from qpsafe.tick import BAD_INPUT, FAULT, Tick
 
 NEAR = Drag(PERSON, (0.75, 0.1, 0.0), 2.0)
@@ -52,12 +53,33 @@ def test_who_is_dragged_to_the_robot_makes_it_evade_and_come_back(live: Live) ->
     assert np.abs(back.reference.q - calm.reference.q).max() < 2e-3
 
 
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_who_is_dragged_walks(live: Live, speed: float) -> None:
+    """On the way one foot or the other stands on the floor and stays there, each swings; at the goal both stand."""
+    live.follow(live.wish._replace(drag=Drag(PERSON, (4.8, 1.5, 0.0), 4.0)))
+    for k in range(400):
+        live.crowd(k)
+    live.follow(live.wish._replace(drag=Drag(PERSON, (1.44, 0.45, 0.0), speed)))  # straight towards the robot
+    ways = []
+    before = live.crowd(400)[0].ends
+    for k in range(401, 401 + round((3.6 / speed + 1.0) / DT)):
+        ends = live.crowd(k)[0].ends
+        if 600 < k < 600 + round(1.3 / speed / DT):  # at its speed
+            toes = ends[[7, 13], 1] - before[[7, 13], 1]  # heels roll
+            ways.append(np.linalg.norm(toes, axis=-1))
+        before = ends
+    assert (np.min(ways, axis=1) < 1e-9).mean() > 0.97  # but for ticks in which one lands and the other leaves
+    assert (np.max(ways, axis=0) > 1.2 * speed * DT).all()
+    standing = live.experiment.story.persons[0].pose(1.44, 0.45, math.atan2(-0.45, -1.44))
+    assert np.abs(before - standing.ends).max() < 1e-9
+
+
 @pytest.mark.parametrize("mode", [PERSON, HAND])
 def test_nobody_is_faster_than_the_mouse_allows(live: Live, mode: str) -> None:
     live.follow(live.wish._replace(drag=Drag(mode, (1.5, -0.9, 0.5), 0.7)))
     live.follow(live.wish._replace(drag=Drag(mode, (0.8, 0.9, 0.3), 0.7)))
     places = [live.crowd(k)[0] for k in range(1, 200)]
-    grips = np.array([(pose.hands[1] if mode == HAND else pose.positions[3]) for pose in places])
+    grips = np.array([(pose.hands[1] if mode == HAND else pose.positions[3][:2]) for pose in places])  # level
     ways = np.linalg.norm(np.diff(grips, axis=0), axis=1)
     assert (ways <= 0.7 * 0.004 * (1.0 if mode == PERSON else 1.05) + 1e-6).all()  # the arm bends a little beside
     assert ways.max() > 0.5 * 0.7 * 0.004
