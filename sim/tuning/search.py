@@ -98,7 +98,7 @@ def run_search(
     *,
     workers: int = 1,
     minutes: float | None = None,
-    play: PieceFunction = play_piece,
+    play: PieceFunction | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Journal:
     """Search, or go on.
@@ -111,7 +111,7 @@ def run_search(
         progress: Told after every batch.
         workers: Processes, if there is no executor; 1 for none but this one.
         minutes: After which no batch is begun; None for no limit. A shorter search is the beginning of a longer one.
-        play: Plays a piece.
+        play: Plays a piece; by default `qpsafe.sim.tuning.play.play_piece`.
         notice: Told in words when a process has died.
 
     Raises:
@@ -124,7 +124,7 @@ def run_search(
     crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
     good = False
     try:
-        hall = _Hall(search, space, crew, play, notice)
+        hall = _Hall(search, space, crew, play or play_piece, notice)
         if progress is not None:
             progress(len(kept.trials), kept)
         while len(kept.trials) < trials:
