@@ -48,7 +48,7 @@ class Rungs(NamedTuple):
         lagged: Encounters with each of `LAGS`, on the last rung.
     """
 
-    encounters: tuple[int, ...] = (24, 96, 384)
+    encounters: tuple[int, ...] = (24, 72, 216)
     goes_on: tuple[float, ...] = (0.375, 0.125)
     lagged: int = 12
 
