@@ -26,7 +26,7 @@ def _sections(said: dict[str, Any]) -> Iterator[Html]:
     yield element("h1", f"Tuning of {said['robot']}: {counted(len(said['trials']), 'trial')}")
     yield element(
         "p",
-        f"Search {said['search']['seed']}: all met the same people, on the seeds {first} to {last}; {whole:,} met all of "
+        f"Search {said['search']['seed']}: all met the same people, seeds {first} to {last}; {whole:,} met all of "
         "them, the others were stopped early. Each objective is a mean over encounters.",
         class_="soft",
     )

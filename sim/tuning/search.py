@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,9 +21,8 @@ from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
 from qpsafe.sim.tuning.front import Objectives, ranks
 from qpsafe.sim.tuning.journal import Journal
 from qpsafe.sim.tuning.objectives import Outcome, Played, Score, score
-from qpsafe.sim.tuning.play import Piece, PieceFunction, lagged, pieces, play_piece
+from qpsafe.sim.tuning.play import Piece, PieceFunction, lagged, pieces, play_piece, timed
 from qpsafe.sim.tuning.space import Point, Space
-from qpsafe.sim.tuning.timed import Timed
 from qpsafe.sim.tuning.trial import Trial, front_of
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class _Hall:
         notice: Callable[[str], None] | None,
     ) -> None:
         self._search, self._space, self._crew, self._notice = search, space, crew, notice
-        self._play, self._seconds = Timed(play), 0.0
+        self._play, self._seconds = partial(timed, play), 0.0
 
     def spent(self) -> float:
         """Processes' time since it was last asked for [s]."""
