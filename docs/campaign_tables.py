@@ -29,6 +29,7 @@ PAGES = {
     DOCS / "explanation" / "one-tick.md": "campaign",
     DOCS / "how-to" / "stories.md": "campaign",
     DOCS / "how-to" / "stream.md": "campaign",
+    DOCS / "how-to" / "tune.md": "campaign",
 }
 DATA = DOCS / "data" / "campaign.json"
 
@@ -155,7 +156,50 @@ def gained() -> str:
     return "\n".join([*head, f"| orientation released in medium danger (> 0.05 rad) | {released} |", *distances()])
 
 
-TABLES = {"worst": worst, "engine": engine, "peers": peers, "fixed": fixed, "gained": gained, **demo_tables.TABLES}
+def tuned() -> str:
+    """What came of each run of `qpsafe tune`, judged on encounters that nothing was tuned on."""
+    head = "| robot | search | tried, all encounters | judged on | harm | work lost [s] | contacts | furniture, self |"
+    rows = [head, "|" + " --- |" * 8]
+    for run in committed("tune")["runs"]:
+        judged, search = run["judgement"], run["search"]
+        name, tried = f"`{run['robot']}`", f"{run['tried']}, {run['whole']}"
+        if judged is None:
+            rows.append(f"| {name} | {search['seed']} | {tried} | - | {run['sentence']} | | | |")
+            continue
+        harm, lost = judged["means"]["harm"], judged["means"]["lost"]
+        touched, *others = (judged["shares"][key] for key in ("contacts", "furniture", "self"))
+        cells = [
+            f"{harm['present']:.4f} to {harm['tuned']:.4f}, p = {harm['p']:.2g}",
+            f"{lost['present']:.2f} to {lost['tuned']:.2f}, p = {lost['p']:.2g}",
+            f"{touched['present']} to {touched['tuned']}, p = {touched['p']:.2g}",
+            ", ".join(f"{other['present']} to {other['tuned']}" for other in others),
+        ]
+        rows.append(f"| {name} | {search['seed']} | {tried} | {judged['encounters']:,} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def tuned_values() -> str:
+    """Present and chosen values of the first run."""
+    run = committed("tune")["runs"][0]
+    rows = ["| parameter | present | chosen |", "| --- | --- | --- |"]
+    for table, keys in run["present"]["values"].items():
+        for key, value in keys.items():
+            both = (value, run["chosen"]["values"][table][key])
+            cells = (", ".join(f"{x:.3g}" for x in (one if isinstance(one, list) else [one])) for one in both)
+            rows.append(f"| `[{table}] {key}` | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+TABLES = {
+    "tuned": tuned,
+    "tuned-values": tuned_values,
+    "worst": worst,
+    "engine": engine,
+    "peers": peers,
+    "fixed": fixed,
+    "gained": gained,
+    **demo_tables.TABLES,
+}
 
 
 def made(text: str, campaign: str = "campaign") -> str:

@@ -42,6 +42,7 @@ sim.experiments sim.sick sim.placement
 sim.campaign.people
 sim.campaign
 sim.campaign.report
+sim.tuning
 sim.irc5 sim.web
 cli.common cli.sheet cli.outputs
 cli.check

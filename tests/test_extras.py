@@ -111,6 +111,7 @@ WITH_SIM = {
     "video": "from qpsafe.sim.drawing.render import VideoWriter; VideoWriter('a.mp4', None, fps=25)",
     "place": "from qpsafe.placement.surface import _trimesh; _trimesh('a mesh')",
     "campaign": "from qpsafe.sim.campaign.store import _pyarrow; _pyarrow()",
+    "tune": "from qpsafe.sim.tuning.ask import study_of; study_of(None, ())",
     "gym": "import qpsafe.sim.campaign.gym.environment",
     "web": "from qpsafe.sim.web.server import need_viser; need_viser()",
     "dask": "from qpsafe.sim.campaign.executors import dask_executor; dask_executor('tcp://127.0.0.1:1').__enter__()",

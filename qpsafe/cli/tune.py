@@ -204,7 +204,7 @@ def _report(found: Tuned, judged: Judged | None, folder: Path, screen: Console, 
 
     said = result(found, judged)
     write_text(folder / "tune.json", json_text(said) + "\n")
-    write_text(folder / "tune.html", tuning_page(found, said))
+    write_text(folder / "tune.html", tuning_page(said))
     if json:
         print_json(said)
         return

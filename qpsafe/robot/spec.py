@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +44,8 @@ class DHChain(NamedTuple):
     joints: tuple[int, ...]
 
 
-#: Names and values.
-Stated = tuple[tuple[str, float], ...]
+#: Names and numbers.
+Stated = tuple[tuple[str, Any], ...]
 
 
 class Tuned(NamedTuple):

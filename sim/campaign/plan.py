@@ -54,9 +54,9 @@ class Plan:
         sensor: One of `SENSORS`, by which all controllers see that do not say otherwise.
         lag: Delay of the servos, in whole ticks, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
-        cell: A TOML file of furniture, see `qpsafe.sensing.cell_file`, besides the robot's pedestal; None for none.
         trials: How many.
         seed: Of the first trial; that of trial k is seed + k.
+        cell: A TOML file of furniture, see `qpsafe.sensing.cell_file`, besides the robot's pedestal; None for none.
     """
 
     robot: str = "irb140"
@@ -65,9 +65,9 @@ class Plan:
     sensor: str = "ideal"
     lag: float = 0.0
     people: str | None = None
-    cell: str | None = None
     trials: int = FULL
     seed: int = 0
+    cell: str | None = None
 
     def __post_init__(self) -> None:
         if self.sensor not in SENSORS:

@@ -126,12 +126,13 @@ def judge(
         seed: Of the first encounter; none that a search has used.
     """
     base = replace(plan, seed=seed, trials=encounters, lag=0.0, controllers=("default",))
-    rows = []
-    for k, one in enumerate((base, replace(base, robot=str(tuned)))):
+
+    def rows(one: Plan, before: int) -> Columns:
         folder = None if out is None else out / f"judge-{one.digest()[:8]}"
-        heard = None if progress is None else _shifted(progress, k * encounters, 2 * encounters)
-        rows.append(run_campaign(one, folder, executor, heard, workers=workers).columns)
-    return compared(*rows, seed)
+        heard = None if progress is None else _shifted(progress, before, 2 * encounters)
+        return run_campaign(one, folder, executor, heard, workers=workers).columns
+
+    return compared(rows(base, 0), rows(replace(base, robot=str(tuned)), encounters), seed)
 
 
 def compared(present: Columns, tuned: Columns, seed: int) -> Judged:

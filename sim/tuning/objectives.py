@@ -111,8 +111,7 @@ def score(mine: Played, reference: Played) -> Score:
             # no more than the present values with this lag, or without any
             same = reference[lag][: len(runs)]
             constraints[f"lag {lag}"] = _chatter(runs, same, CHATTER_LAGGED)
-    found = (_paired(plain, reference[0], key) for key in ("harm", "lost"))
-    return Score(*found, constraints)
+    return Score(_paired(plain, reference[0], "harm"), _paired(plain, reference[0], "lost"), constraints)
 
 
 def mean(runs: Sequence[Outcome], key: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from qpsafe.sim.campaign.report.figures import svg
 from qpsafe.sim.campaign.report.html import Html, element, page, table
@@ -12,36 +12,28 @@ from qpsafe.sim.tuning import objectives
 from qpsafe.sim.tuning.figures import front_figure, sensitivity_figure
 from qpsafe.text.words import counted
 
-if TYPE_CHECKING:
-    from qpsafe.sim.tuning.result import Tuned
-
 _MEANS = {"harm": ("harm", "{:.4f}"), "lost": ("work lost [s]", "{:.2f}"), "reversals": ("reversals", "{:.1f}")}
 
 
-def tuning_page(found: Tuned, said: dict[str, Any]) -> str:
-    """The page.
-
-    Args:
-        found: Of the search.
-        said: Its result, see `qpsafe.sim.tuning.result`.
-    """
-    return page(f"Tuning of {said['robot']}", *_sections(found, said))
+def tuning_page(said: dict[str, Any]) -> str:
+    """The page of a result, see `qpsafe.sim.tuning.result`."""
+    return page(f"Tuning of {said['robot']}", *_sections(said))
 
 
-def _sections(found: Tuned, said: dict[str, Any]) -> Iterator[Html]:
-    whole = sum(trial.whole for trial in found.trials)
+def _sections(said: dict[str, Any]) -> Iterator[Html]:
+    whole = sum(trial["whole"] for trial in said["trials"])
     first, last = said["search"]["encounters"]
-    yield element("h1", f"Tuning of {said['robot']}: {counted(len(found.trials), 'trial')}")
+    yield element("h1", f"Tuning of {said['robot']}: {counted(len(said['trials']), 'trial')}")
     yield element(
         "p",
-        f"Search {found.search.seed}: all met the same people, on the seeds {first} to {last}; {whole:,} met all of "
+        f"Search {said['search']['seed']}: all met the same people, seeds {first} to {last}; {whole:,} met all of "
         "them, the others were stopped early. Each objective is a mean over encounters.",
         class_="soft",
     )
     taken = said["judgement"] is not None and said["judgement"]["worth"]
-    yield element("p", said["sentence"], class_="fine" if taken or found.chosen.number == 0 else "fault")
+    yield element("p", said["sentence"], class_="fine" if taken or said["chosen"]["number"] == 0 else "fault")
     yield element("h2", "The front")
-    yield _figure(svg(front_figure(found.trials, found.best, found.chosen), "front"), "Best is down left.")
+    yield _figure(svg(front_figure(said), "front"), "Best is down left.")
     yield _front(said)
     if said["judgement"] is not None:
         yield element("h2", "Chosen against present, on encounters that nothing was tuned on")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from time import process_time
 from typing import TYPE_CHECKING, NamedTuple
 
 from qpsafe.sim.campaign.measures import measures
@@ -15,6 +16,7 @@ from qpsafe.sim.tuning.objectives import Outcome
 from qpsafe.sim.tuning.values import Values
 
 if TYPE_CHECKING:
+    from qpsafe.sim.campaign.opponents.registry import Controls
     from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.station import Station
 
@@ -60,16 +62,25 @@ def play_piece(piece: Piece) -> list[list[Outcome]]:
     return found
 
 
+def timed(play: PieceFunction, numbered: tuple[int, Piece]) -> tuple[int, list[list[Outcome]], float]:
+    """Play a numbered piece: its number, outcomes, and processor time [s], since pieces come back in any order.
+
+    Args:
+        play: Plays it.
+        numbered: Number and piece.
+    """
+    number, piece = numbered
+    begun = process_time()
+    return number, play(piece), process_time() - begun
+
+
 def controller_of(values: Values) -> Opponent:
     """The default controller, but for its values."""
-    return Opponent(PREFIX + repr(values), "SafetyController with these values", _Made(values))
 
+    def make(station: Station) -> Controls:
+        return station.controller(**values.parts(station.robot))
 
-class _Made(NamedTuple):
-    values: Values
-
-    def __call__(self, station: Station) -> object:
-        return station.controller(**self.values.parts(station.robot))
+    return Opponent(PREFIX + repr(values), "SafetyController with these values", make)
 
 
 def _forget(station: Station) -> None:

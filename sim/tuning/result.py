@@ -79,7 +79,10 @@ def result(found: Tuned, judged: Judged | None) -> dict[str, Any]:
         "sensitivity": sensitivity(space, found.trials),
         "space": [d._asdict() for d in space.dimensions],
         "trials": [
-            {"number": t.number, "encounters": t.encounters, "whole": t.whole, **t.score._asdict()}
+            {
+                "number": t.number, "encounters": t.encounters, "whole": t.whole, "harm": t.score.harm,
+                "lost": t.score.lost, "violation": t.score.violation,
+            }
             for t in found.trials
         ],
         "search": {

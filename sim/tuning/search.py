@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,9 +21,8 @@ from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
 from qpsafe.sim.tuning.front import Objectives, ranks
 from qpsafe.sim.tuning.journal import Journal
 from qpsafe.sim.tuning.objectives import Outcome, Played, Score, score
-from qpsafe.sim.tuning.play import Piece, PieceFunction, lagged, pieces, play_piece
+from qpsafe.sim.tuning.play import Piece, PieceFunction, lagged, pieces, play_piece, timed
 from qpsafe.sim.tuning.space import Point, Space
-from qpsafe.sim.tuning.timed import Timed
 from qpsafe.sim.tuning.trial import Trial, front_of
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Rungs(NamedTuple):
         lagged: Encounters with each of `LAGS`, on the last rung.
     """
 
-    encounters: tuple[int, ...] = (24, 96, 384)
+    encounters: tuple[int, ...] = (24, 72, 216)
     goes_on: tuple[float, ...] = (0.375, 0.125)
     lagged: int = 12
 
@@ -98,7 +98,7 @@ def run_search(
     *,
     workers: int = 1,
     minutes: float | None = None,
-    play: PieceFunction = play_piece,
+    play: PieceFunction | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> Journal:
     """Search, or go on.
@@ -111,7 +111,7 @@ def run_search(
         progress: Told after every batch.
         workers: Processes, if there is no executor; 1 for none but this one.
         minutes: After which no batch is begun; None for no limit. A shorter search is the beginning of a longer one.
-        play: Plays a piece.
+        play: Plays a piece; by default `qpsafe.sim.tuning.play.play_piece`.
         notice: Told in words when a process has died.
 
     Raises:
@@ -124,7 +124,7 @@ def run_search(
     crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
     good = False
     try:
-        hall = _Hall(search, space, crew, play, notice)
+        hall = _Hall(search, space, crew, play or play_piece, notice)
         if progress is not None:
             progress(len(kept.trials), kept)
         while len(kept.trials) < trials:
@@ -157,7 +157,7 @@ class _Hall:
         notice: Callable[[str], None] | None,
     ) -> None:
         self._search, self._space, self._crew, self._notice = search, space, crew, notice
-        self._play, self._seconds = Timed(play), 0.0
+        self._play, self._seconds = partial(timed, play), 0.0
 
     def spent(self) -> float:
         """Processes' time since it was last asked for [s]."""

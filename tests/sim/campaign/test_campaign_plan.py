@@ -88,6 +88,7 @@ def test_a_digest_changes_with_all_that_decides_rows_and_with_nothing_else() -> 
         "lag": 0.012,
         "people": __file__,
         "seed": 1,
+        "cell": __file__,
     }
     digests = {dataclasses.replace(plan, **{key: value}).digest() for key, value in others.items()} | {plan.digest()}
     assert len(digests) == len(others) + 1

@@ -1,0 +1,57 @@
+"""Tuning in the engine: trial 0 is the default controller, and what is ten times too slow is made better."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import qpsafe
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.trial import run_trial
+from qpsafe.sim.tuning.ask import BATCH
+from qpsafe.sim.tuning.objectives import Outcome, mean
+from qpsafe.sim.tuning.play import Piece, play_piece
+from qpsafe.sim.tuning.robot_file import write_folder
+from qpsafe.sim.tuning.search import Rungs, Search, run_search
+from qpsafe.sim.tuning.trial import front_of
+from qpsafe.sim.tuning.values import present
+
+SEED = 7_990_000
+
+
+@pytest.mark.slow
+def test_the_present_values_play_as_the_default_controller_does() -> None:
+    plan = Plan(trials=3, seed=SEED, controllers=("default",))
+    played = play_piece(Piece(plan, (0, 1, 2), (present(qpsafe.load_robot("irb140")),)))
+    assert [runs[0] for runs in played] == [Outcome.of(run_trial(plan, k)[0]) for k in range(3)]
+
+
+@pytest.mark.slow
+def test_values_of_another_robots_file_play_as_that_robot_does(tmp_path: Path) -> None:
+    robot = qpsafe.load_robot("irb140")
+    other = replace(present(robot), calm=0.6, hold_time=0.3, damping=(15.0,) * 6)
+    folder = write_folder(robot, other, "a test", tmp_path / "other")
+    plan = Plan(trials=1, seed=SEED + 1, controllers=("default",))
+    ((tuned,),) = play_piece(Piece(plan, (0,), (other,)))
+    loaded = Outcome.of(run_trial(replace(plan, robot=str(folder)), 0)[0])
+    assert tuned.harm == pytest.approx(loaded.harm, rel=1e-6)
+    assert tuned.lost == pytest.approx(loaded.lost, abs=0.02)
+
+
+@pytest.mark.slow
+def test_what_is_ten_times_too_late_is_made_better(tmp_path: Path) -> None:
+    """A factor of ten in M decides over contacts; people of the judgement are others than those of the search."""
+    robot = qpsafe.load_robot("irb140")
+    now = present(robot)
+    late = replace(now, mass=tuple(10.0 * m for m in now.mass))
+    folder = write_folder(robot, late, "a test", tmp_path / "late")
+    search = Search(Plan(robot=str(folder)), 98, Rungs((12, 24, 48), lagged=3))
+    journal = run_search(search, 1 + 3 * BATCH)
+    start, best = journal.trials[0].objectives, front_of(journal.trials)
+    assert min(trial.score.harm for trial in best) < start.harm
+    chosen = search.space().at(min(best, key=lambda trial: trial.score.harm).point)
+    judged = play_piece(Piece(Plan(trials=24, seed=8_500_000), tuple(range(24)), (late, chosen)))
+    before, after = ([runs[k] for runs in judged] for k in range(2))
+    assert mean(after, "harm") < mean(before, "harm")

@@ -1,0 +1,102 @@
+"""Values in a robot's file: they load again as the same controller, and comments and other tables stay."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import qpsafe
+from qpsafe.errors import ConfigurationError
+from qpsafe.sim.tuning.robot_file import MARK, edited, farthest, write_folder, write_values
+from qpsafe.sim.tuning.space import Space
+from qpsafe.sim.tuning.values import TABLES, present
+
+ROBOTS = ("irb140", "iiwa14", "irb14000")
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_written_loads_as_the_same_controller(name: str, tmp_path: Path) -> None:
+    robot = qpsafe.load_robot(name)
+    space = Space.of(robot)
+    values = space.at(space.near(np.random.default_rng(1), 0.3))
+    folder = write_folder(robot, values, "a run", tmp_path / "copy")
+    other = qpsafe.load_robot(folder)
+    assert farthest(present(other), values) < 1e-12
+    frame = robot.tool_frames[0]
+    here = qpsafe.FixedPose(robot.pose(frame, robot.home))
+    tasks = [qpsafe.PositionTask(frame, here), qpsafe.OrientationTask(frame, here)]
+    loaded, made = qpsafe.SafetyController(other, tasks), values.parts(robot)
+    assert loaded.activation.levels == made["activation"].levels
+    np.testing.assert_allclose(loaded.evasion.matrices, made["evasion"].matrices, rtol=1e-12)
+    for key in TABLES["recovery"]:
+        assert getattr(loaded.recovery_rules, key) == pytest.approx(getattr(made["recovery"], key), rel=1e-12)
+    for key in TABLES["gate"]:
+        assert getattr(loaded.gate, key) == getattr(made["gate"], key)
+    # the source's are there as before
+    assert present(qpsafe.load_robot(folder, parameters="paper")) == present(robot)
+    # everything else stays
+    before, after = (tomllib.loads((f / "robot.toml").read_text(encoding="utf-8")) for f in (robot.folder, folder))
+    assert {k: v for k, v in after.items() if k not in TABLES} == {k: v for k, v in before.items() if k not in TABLES}
+    lines = (folder / "robot.toml").read_text(encoding="utf-8").splitlines()
+    for line in (robot.folder / "robot.toml").read_text(encoding="utf-8").splitlines():
+        if line.lstrip().startswith("#") or "#" in line:
+            assert line in lines
+    assert lines.count(f"{MARK} a run") == len(TABLES)
+
+
+def test_a_later_run_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
+    robot = qpsafe.load_robot("irb140")
+    space = Space.of(robot)
+    folder = write_folder(robot, space.at(space.near(np.random.default_rng(2), 0.2)), "one", tmp_path / "copy")
+    once = qpsafe.load_robot(folder)
+    values = space.at(space.near(np.random.default_rng(3), 0.2))
+    write_values(folder / "robot.toml", once, values, "two")
+    text = (folder / "robot.toml").read_text(encoding="utf-8")
+    assert f"{MARK} one" not in text
+    assert text.count(f"{MARK} two") == len(TABLES)
+    assert farthest(present(qpsafe.load_robot(folder)), values) < 1e-12
+
+
+KEYS = st.sampled_from(["delta", "mass", "calm"])
+VALUES = st.one_of(st.floats(0.001, 1e6), st.lists(st.floats(0.1, 9.0), min_size=1, max_size=4))
+
+
+@settings(max_examples=60)
+@given(st.dictionaries(KEYS, VALUES, min_size=1), st.booleans())
+def test_an_edited_text_says_what_it_should_and_keeps_the_rest(values: dict[str, object], there: bool) -> None:
+    text = 'name = "[danger]"  # [danger]\nlinks = [\n    ["a", "b"],\n    ["c"],\n]\n\n'
+    text += (
+        "[danger]  # of the field\ndelta = 1.5    # ours\nmass = [\n    1.0,  # first\n    2.0,\n]\nother = 3\n\n"
+        * there
+    )
+    text += '# of the part below\n[[regions]]\nname = "x"\n'
+    found = edited(text, {"danger": values}, f"{MARK} z")
+    assert found is not None
+    said, before = tomllib.loads(found), tomllib.loads(text)
+    assert said.pop("danger") == before.pop("danger", {}) | values
+    assert said == before
+    assert '# of the part below\n[[regions]]\nname = "x"' in found
+    if there:
+        assert "# of the field" in found
+        assert "# ours" in found
+
+
+@pytest.mark.parametrize("danger", ["danger = { delta = 11.5, epsilon = 0.15, delta_f = 7.5, epsilon_f = 0.25 }"])
+def test_a_file_that_cannot_be_edited_is_named_and_stays_as_it_is(tmp_path: Path, danger: str) -> None:
+    robot = qpsafe.load_robot("irb140")
+    shutil.copytree(robot.folder, tmp_path / "own")
+    file = tmp_path / "own" / "robot.toml"
+    text = file.read_text(encoding="utf-8")
+    start, end = text.index("[danger]"), text.index("# Where distance sensors")
+    text = f"{danger}\n" + text[:start] + text[end:]
+    file.write_text(text, encoding="utf-8")
+    own = qpsafe.load_robot(tmp_path / "own")
+    with pytest.raises(ConfigurationError, match=r"robot.toml.*danger.*a line of its own"):
+        write_values(file, own, present(own), "x")
+    assert file.read_text(encoding="utf-8") == text

@@ -1,0 +1,168 @@
+"""The same trials whoever plays them and however often they are stopped; what is finished is never lost."""
+
+from __future__ import annotations
+
+import json
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import made_up_values
+import pytest
+
+from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.sim.campaign.executors import dask_executor
+from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.tuning.ask import BATCH
+from qpsafe.sim.tuning.journal import Journal
+from qpsafe.sim.tuning.play import Piece
+from qpsafe.sim.tuning.result import Tuned
+from qpsafe.sim.tuning.search import APART, JUDGE, MOST, SEARCH, Rungs, Search, run_search
+from qpsafe.sim.tuning.sensitivity import sensitivity
+from qpsafe.sim.tuning.trial import Trial, front_of
+
+SEARCHED = Search(Plan(), 3, Rungs((6, 18, 36), lagged=3))
+BATCHES = 4
+TRIALS = 1 + BATCHES * BATCH
+
+
+def run(out: Path | None = None, trials: int = TRIALS, **options: Any) -> Journal:
+    return run_search(SEARCHED, trials, out, **({"play": made_up_values.play} | options))
+
+
+@pytest.fixture(scope="module")
+def straight() -> list[Trial]:
+    return run().trials
+
+
+def test_threads_two_processes_and_a_file_give_the_same_trials(straight: list[Trial], tmp_path: Path) -> None:
+    with ThreadPoolExecutor(3) as executor:
+        assert run(executor=executor).trials == straight
+    assert run(tmp_path / "search.jsonl").trials == straight
+    assert run(trials=1 + 2 * BATCH, workers=2).trials == straight[: 1 + 2 * BATCH]
+
+
+def test_two_dask_workers_give_the_same_trials(straight: list[Trial]) -> None:
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster, dask_executor(cluster.scheduler_address) as executor:
+        assert run(executor=executor).trials == straight
+
+
+@pytest.mark.parametrize("batches", [0, 1, 3])
+def test_what_is_stopped_goes_on_to_the_same_end(straight: list[Trial], tmp_path: Path, batches: int) -> None:
+    def stopping(done: int, journal: Journal) -> None:
+        if journal.batches > batches:
+            raise KeyboardInterrupt
+
+    file = tmp_path / "a" / "search.jsonl"
+    with pytest.raises(KeyboardInterrupt):
+        run(file, progress=stopping)
+    assert len(Journal(file, SEARCHED.identity()).trials) == (1 + batches * BATCH)
+    assert run(file).trials == straight
+    assert run(file, play=forbidden).trials == straight  # nothing is left to play
+
+
+def forbidden(piece: Piece) -> Any:
+    raise AssertionError("played again")
+
+
+@pytest.mark.parametrize("cut", [1, 40, 700])
+def test_a_line_that_was_half_written_is_played_again(straight: list[Trial], tmp_path: Path, cut: int) -> None:
+    """What kill -9 or a power cut leaves."""
+    file = tmp_path / "search.jsonl"
+    run(file)
+    data = file.read_bytes()
+    file.write_bytes(data[:-cut])
+    assert len(Journal(file, SEARCHED.identity()).trials) == TRIALS - BATCH
+    assert run(file).trials == straight
+    before, after = (
+        [json.loads(line).get("trials") for line in text.splitlines()] for text in (data, file.read_bytes())
+    )
+    assert before == after
+
+
+def test_a_shorter_search_is_the_beginning_of_a_longer_one(straight: list[Trial], tmp_path: Path) -> None:
+    file = tmp_path / "search.jsonl"
+    assert run(file, 2).trials == straight[: 1 + BATCH]  # whole batches
+    assert run(file, minutes=0.0).trials == straight[: 1 + BATCH]
+    assert run(file).trials == straight
+    assert run(minutes=0.0).trials == straight[:1]  # the present values at least
+
+
+def test_another_search_is_refused_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "search.jsonl"
+    run(file, 1)
+    for other, key in (
+        (replace(SEARCHED, seed=4), "search"),
+        (replace(SEARCHED, rungs=Rungs((6, 18, 42), lagged=3)), "rungs"),
+        (replace(SEARCHED, plan=replace(SEARCHED.plan, motions=("hold",))), "motions"),
+    ):
+        with pytest.raises(ConfigurationError, match=rf"search.jsonl.*{key}.*another folder"):
+            run_search(other, 1, file, play=made_up_values.play)
+    file.write_text("no journal\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="line of JSON"):
+        run(file)
+
+
+def test_seeds_of_searches_and_of_the_judgement_never_meet() -> None:
+    for seed in (0, MOST):
+        plan = Search(Plan(seed=5, lag=0.02), seed, SEARCHED.rungs).plan
+        assert plan.seed == SEARCH + APART * seed
+        assert plan.seed + plan.trials <= min(SEARCH + APART * (seed + 1), JUDGE)
+        assert plan.lag == 0.0
+    assert Rungs().encounters[-1] <= APART
+    for seed in (-1, MOST + 1, True, 1.0):
+        with pytest.raises(ConfigurationError, match=r"seed.*0 to 99"):
+            Search(Plan(), seed)  # type: ignore[arg-type]
+
+
+def test_the_search_gets_better_and_its_front_keeps_every_constraint(straight: list[Trial]) -> None:
+    best = front_of(straight)
+    start = straight[0].objectives
+    assert straight[0].point == SEARCHED.space().start
+    assert straight[0].counts
+    assert any(trial.objectives.dominates(start) for trial in best)
+    for trial in best:
+        assert trial.whole
+        assert trial.encounters == 36
+        assert all(value <= 0.0 for value in trial.score.constraints.values())
+        assert not any(o.objectives.dominates(trial.objectives) for o in straight if o.counts)
+    # the made-up way back touches furniture where it is fast
+    fast = [t for t in straight if t.whole and SEARCHED.space().at(t.point).speed > 0.9]
+    assert all(t.score.constraints["furniture"] > 0.0 and t not in best for t in fast)
+
+
+def test_few_are_played_through_and_every_batch_has_one(straight: list[Trial]) -> None:
+    for batch in range(1, 1 + BATCHES):
+        mine = [trial for trial in straight if trial.batch == batch]
+        assert sorted(trial.encounters for trial in mine) == [6] * 5 + [18] * 2 + [36]
+        assert [trial.number for trial in mine] == list(range(1 + BATCH * (batch - 1), 1 + BATCH * batch))
+
+
+def test_what_matters_is_what_the_made_up_outcomes_depend_on(straight: list[Trial]) -> None:
+    space = SEARCHED.space()
+    found = sensitivity(space, straight)
+    for shares in found.values():
+        assert sum(shares.values()) == pytest.approx(1.0)
+        assert list(shares) == [d.name for d in space.dimensions]
+        deciding = sum(shares[name] for name in ("delta", "delay_arm", "dwell"))
+        assert deciding > 3.0 / len(shares)
+    assert sensitivity(space, straight[:5]) == {}
+
+
+def test_the_choice_is_on_the_front_and_names_its_run(tmp_path: Path) -> None:
+    journal = run(tmp_path / "search.jsonl")
+    for prefer in ("safety", "balanced", "work"):
+        found = Tuned.of(SEARCHED, SEARCHED.space(), journal, prefer)
+        assert found.chosen in found.best
+        for word in ("search 3", f"{TRIALS} trials", prefer, f"trial {found.chosen.number}"):
+            assert word in found.run
+
+
+def test_without_optuna_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(MissingExtraError, match=r"optuna: pip install 'qpsafe\[tune\]'"):
+        run(trials=1 + 2 * BATCH)
