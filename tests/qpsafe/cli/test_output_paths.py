@@ -54,6 +54,7 @@ def test_the_outputs_are_those_of_all_commands() -> None:
         *(
             ("bench", "out"),
             ("check", "out"),
+            ("tune", "out"),
             ("add", "out"),
             ("story", "plot"),
             ("replay", "video"),

@@ -31,6 +31,7 @@ from qpsafe.cli import (
     sick_sensors,
     story,
     stream_report,
+    tune,
 )
 from qpsafe.cli.campaign import limit, single
 from qpsafe.cli.campaign import run as campaign
@@ -263,6 +264,15 @@ def of_limit(screen: Console, folder: Path) -> None:
     limit._show_summary(HOSTILE, limits_summary([row] * 1234), screen)
 
 
+def of_tuning(screen: Console, folder: Path) -> None:
+    front = [{"number": number, "harm": 12.3456, "lost": 123.456} for number in (0, 17, 2999)]
+    shares = {name: dict.fromkeys((f"{table} {HOSTILE}" for table in "abcdef"), 1.0) for name in ("harm", "lost")}
+    for faults in ([], [HOSTILE]):
+        said = {"front": front, "present": front[0], "chosen": front[1], "sensitivity": shares, "sentence": HOSTILE,
+                "judgement": {"new_faults": faults}}  # fmt: skip
+        tune._show(said, screen)
+
+
 def of_checks(screen: Console, folder: Path) -> None:
     of_fixed(screen, folder)
 
@@ -292,6 +302,7 @@ TABLES: dict[Callable[..., None], Show] = {
     sick_sensors.show: of_sick,
     story.story: of_story,
     stream_report.show: of_stream,
+    tune._show: of_tuning,
 }
 
 
