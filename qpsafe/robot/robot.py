@@ -61,6 +61,7 @@ class Robot(Fixed):
         dh_frames: Names of the frames of that table.
         danger: (Δ, ε) and (Δ_f, ε_f) as the robot's file states them, or None.
         tuned: Other parameters of a controller that its file states, see `qpsafe tune`.
+        parameters: "robot", or "paper" where it was asked to leave out what its file states of these.
         notes: What is missing or doubtful in the robot's files, in words; empty if all is well.
         spots_path: File of the distance sensors, or None where there is none.
         regions: Parts of the surface that may carry distance sensors.
@@ -96,6 +97,7 @@ class Robot(Fixed):
         self.dh_frames = spec.chains[0].frames if len(spec.chains) == 1 else ()
         self.danger = spec.danger
         self.tuned: Tuned = spec.tuned
+        self.parameters = "robot"
         self.notes = spec.notes
         self._held = spec.held
         self.hulls = spec.hulls
@@ -137,10 +139,10 @@ class Robot(Fixed):
         """
         if parameters not in ("robot", "paper"):
             raise ConfigurationError("load_robot", "parameters", parameters, '"robot" or "paper"')
-        if parameters == "robot" or (self.danger is None and self.tuned == Tuned()):
+        if parameters == "robot" or self.parameters == "paper":
             return self
         other = copy(self)
-        other.__dict__ |= {"danger": None, "tuned": Tuned()}
+        other.__dict__ |= {"danger": None, "tuned": Tuned(), "parameters": "paper"}
         return other
 
     def with_spots(self, file: str | Path | None) -> Robot:

@@ -53,6 +53,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     robot, story = experiment.robot, experiment.story
     found: dict[str, Any] = {
         "robot": _found_by(robot),
+        "parameters": robot.parameters,
         "spots": _spots(robot),
         "law": law_settings(experiment.law),
         "rules": None if experiment.rules is None else asdict(experiment.rules),
@@ -78,7 +79,7 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
         ConfigurationError: They do not describe one.
     """
     try:
-        robot = load_robot(settings["robot"])
+        robot = load_robot(settings["robot"]).with_parameters(settings.get("parameters", "robot"))
         if settings.get("spots") is not None:
             robot = robot.with_spots(settings["spots"])
         options: dict[str, Any] = {"law": law_of(settings["law"])}
