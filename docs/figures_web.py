@@ -18,6 +18,14 @@ SIZE = {"width": 1320, "height": 780}
 ARROW = (1.85, 0.5, 0.0)
 
 
+def patient(path: str, folder: Path) -> str:
+    """Chromium that gives way to the simulation: software draws finely for seconds, and ticks would be late."""
+    script = folder / "chromium"
+    script.write_text(f'#!/bin/sh\nexec nice -n 15 "{path}" "$@"\n', encoding="utf-8")
+    script.chmod(0o755)
+    return str(script)
+
+
 def quiet(shown: Tab) -> None:
     """Close the notice that WebGL is software here."""
     notice = shown.page.locator(".mantine-Notification-closeButton")
@@ -82,7 +90,7 @@ def main(names: list[str]) -> None:
     if path is None:
         raise SystemExit("figures_web: needs Chromium")
     for name in names or list(PICTURES):
-        with launched(path) as browser, tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, launched(patient(path, Path(folder))) as browser:
             PICTURES[name](browser, Path(folder))
             print(f"drawn: {name}")
 
