@@ -25,6 +25,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "local")
 #: The longest first: processes that take file after file then end together.
 LONGEST = (
     "test_real_campaign.py",
+    "test_tutorials.py",
     "test_placement_nodes.py",
     "test_docs.py",
     "test_cli.py",
