@@ -24,6 +24,7 @@ PAGES = {
     DOCS / "how-to" / "placement.md": "campaign",
     DOCS / "explanation" / "demo-fixed.md": "campaign",
     DOCS / "explanation" / "demo-path.md": "campaign",
+    DOCS / "explanation" / "demo-pick-and-place.md": "campaign",
     DOCS / "explanation" / "compare.md": "campaign",
     DOCS / "explanation" / "hierarchical-qp.md": "campaign",
     DOCS / "explanation" / "one-tick.md": "campaign",
@@ -156,6 +157,20 @@ def gained() -> str:
     return "\n".join([*head, f"| orientation released in medium danger (> 0.05 rad) | {released} |", *distances()])
 
 
+def judged() -> str:
+    """The default controller on encounters that nothing was chosen by, a line a sensor."""
+    found = {f"default, {name}": committed(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
+    tables = []
+    for measures in (
+        "contacts, moving, towards, over_limit, unseen, furniture, self",
+        "distance_median, energy_mean, lost_time_mean, suspensions_mean, reversals_mean",
+    ):
+        asked = f"<!-- campaign: {measures} -->\n<!-- campaign: end -->"
+        lines = filled(asked, {"controllers": found, "references": []}).splitlines()
+        tables.append("\n".join(lines[2:-2]))
+    return "\n\n".join(tables)
+
+
 def tuned() -> str:
     """What came of each run of `qpsafe tune`, judged on encounters that nothing was tuned on."""
     head = "| robot | search | tried, all encounters | judged on | harm | work lost [s] | contacts | furniture, self |"
@@ -191,6 +206,7 @@ def tuned_values() -> str:
 
 
 TABLES = {
+    "judged": judged,
     "tuned": tuned,
     "tuned-values": tuned_values,
     "worst": worst,

@@ -22,6 +22,7 @@ COMMANDS = {
     "fixed": "demo fixed --json --no-video --out {out}",
     "path": "demo path --json --out {out}",
     "fast-person": "demo fast-person --json --out {out}",
+    "pick": "demo pick-and-place --seeds 10 --jobs 1 --json --out {out}",
     "compare": "compare --full --json",
     "place": "place --no-caps --json --no-pictures --out {out}",
     "place-share": "place --no-caps --probability 0.89 --json --no-pictures --out {out}",

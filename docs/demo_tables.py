@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 DATA = Path(__file__).resolve().parent / "data"
@@ -62,6 +63,46 @@ def fast_person() -> str:
         for run in measured("fast-person")
     ]
     return lines(heads, rows)
+
+
+def pick() -> str:
+    """The third experiment: nobody, the nominal day, many days."""
+    found = measured("pick")
+    alone, runs, cost = found["without_people"], found["runs"], found["cost_per_cycle"]
+    first = runs[0]
+
+    def all_of(key: str, text: str = "{}") -> str:
+        low, high = min(run[key] for run in runs), max(run[key] for run in runs)
+        return f"{text.format(low)} each" if low == high else f"{text.format(low)} to {text.format(high)}"
+
+    def smallest(key: str, scale: float, digits: int) -> str:
+        worst = min(runs, key=lambda run: run[key])
+        middle = scale * median(run[key] for run in runs)
+        return f"{scale * worst[key]:.{digits}f} (seed {worst['seed']}), median of the seeds {middle:.{digits}f}"
+
+    def row(what: str, key: str, show: Callable[[Any], str], spread: str) -> tuple[str, ...]:
+        return what, show(alone[key]), show(first[key]), spread
+
+    times = sorted(run["duration"] for run in runs)
+    rows = [
+        row("screws delivered", "delivered", str, all_of("delivered")),
+        row("missed", "missed", str, all_of("missed")),
+        row("lost", "lost", str, all_of("lost")),
+        ("taken and placed by people", "-", f"{first['taken']}, {first['placed']}",
+         f"{all_of('taken')}, {all_of('placed')}"),
+        row("all ten cycles [s]", "duration", "{:.1f}".format,
+            f"median {median(times):.1f}, range {times[0]:.1f} to {times[-1]:.1f}"),
+        ("cost of people [s per cycle]", "-", f"{(first['duration'] - alone['duration']) / 10:.2f}",
+         f"median {cost['median']:.2f}, quartiles {cost['quartile_1']:.2f} and {cost['quartile_3']:.2f}, "
+         f"range {cost['smallest']:.2f} to {cost['largest']:.2f}"),
+        ("ticks with contact robot-person while the robot moves", "-", str(first["contacts"]), all_of("contacts")),
+        ("smallest distance robot-person [m]", "-", f"{first['nearest']:.3f}", smallest("nearest", 1.0, 3)),
+        row("smallest distance robot-furniture [mm]", "clearance", lambda metres: f"{1e3 * metres:.1f}",
+            smallest("clearance", 1e3, 1)),
+        row("largest CDF_n", "danger", "{:.1f}".format, all_of("danger", "{:.1f}")),
+        row("suspensions", "suspensions", str, all_of("suspensions")),
+    ]  # fmt: skip
+    return lines(("", "nobody", "seed 0", f"seeds 0 to {len(runs) - 1}"), rows)
 
 
 def compare() -> str:
@@ -163,5 +204,5 @@ def late() -> str:
     return lines(("busy processes", "in time", *names, "p50", "p99", "p99.9", "maximum"), rows)
 
 
-TABLES = {"path": path, "fast-person": fast_person, "compare": compare, "place": place, "bench": bench}
+TABLES = {"path": path, "fast-person": fast_person, "pick": pick, "compare": compare, "place": place, "bench": bench}
 TABLES |= {"hqp-random": hqp_random, "hqp-drift": hqp_drift, "late": late}

@@ -90,6 +90,16 @@ def place() -> list[str]:
     ]
 
 
+def pick() -> list[str]:
+    found = measured("pick")
+    runs, alone = found["runs"], found["without_people"]
+    return [
+        f"A cycle takes {alone['duration'] / len(alone['cycle_times']):.1f} s without people",
+        f"seeds 0 to {len(runs) - 1}",
+        f"nothing but the tool's tip came nearer than {1e3 * min(run['clearance'] for run in runs):.0f} mm",
+    ]
+
+
 def hqp() -> list[str]:
     sample, bench = measured("hqp-intervals"), measured("hqp-solvers")
     count, seed, verdicts = sample["problems"], sample["seed"], sample["verdicts"]["own"]
@@ -146,6 +156,7 @@ PAGES: dict[str, Callable[[], list[str]]] = {
     "how-to/stories.md": fast_person,
     "explanation/compare.md": compare,
     "how-to/placement.md": place,
+    "explanation/demo-pick-and-place.md": pick,
     "explanation/hierarchical-qp.md": hqp,
     "explanation/one-tick.md": bench,
     "how-to/faq.md": faq,
