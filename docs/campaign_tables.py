@@ -173,11 +173,11 @@ def judged() -> str:
 
 def tuned() -> str:
     """What came of each run of `qpsafe tune`, judged on encounters that nothing was tuned on."""
-    head = "| robot | search | tried, all encounters | judged on | harm | work lost [s] | contacts | furniture, self |"
-    rows = [head, "|" + " --- |" * 8]
+    heads = ("robot", "search", "tried, all encounters", "processor time [s]", "judged on", "harm", "work lost [s]")
+    rows = [f"| {' | '.join((*heads, 'contacts', 'furniture, self'))} |", "|" + " --- |" * 9]
     for run in committed("tune")["runs"]:
         judged, search = run["judgement"], run["search"]
-        name, tried = f"`{run['robot']}`", f"{run['tried']}, {run['whole']}"
+        name, tried = f"`{run['robot']}`", f"{run['tried']}, {run['whole']} | {search['processor_s']:.0f}"
         if judged is None:
             rows.append(f"| {name} | {search['seed']} | {tried} | - | {run['sentence']} | | | |")
             continue

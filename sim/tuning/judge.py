@@ -84,9 +84,9 @@ class Judged(NamedTuple):
 
     @property
     def worth(self) -> bool:
-        """Whether to take them: surely better in something, surely worse in nothing, without a new fault."""
+        """Whether to take them: surely better in something, no more harm, not surely more lost, no new fault."""
         both = ("harm", "lost")
-        gained, paid = any(map(self.better, both)), any(map(self.worse, both))
+        gained, paid = any(map(self.better, both)), self.means["harm"].difference.value > 0.0 or self.worse("lost")
         return gained and not paid and not self.new_faults
 
     def to_dict(self) -> dict[str, Any]:

@@ -213,7 +213,8 @@ class _Hall:
 
 
 def promising(scores: dict[int, Score], trials: Sequence[Trial], count: int) -> list[int]:
-    """Who goes on: those that keep the constraints first, then those whom fewer dominate, then the smaller sums.
+    """Who goes on: those that keep the constraints first, then those whom fewer dominate, then those whose worse
+    objective, as a share of the present values', is smaller: what is better in both goes before what trades.
 
     Args:
         scores: Of a batch, by number.
@@ -224,9 +225,9 @@ def promising(scores: dict[int, Score], trials: Sequence[Trial], count: int) -> 
     numbers, before = list(scores), [trial.objectives for trial in front_of(trials)]
     dominated = ranks([Objectives(scores[k].harm, scores[k].lost) for k in numbers] + before)
 
-    def key(place: int) -> tuple[float, int, float, int]:
+    def key(place: int) -> tuple[float, int, float, float, int]:
         mine = scores[numbers[place]]
         shares = (mine.harm / max(start.harm, 1e-9), mine.lost / max(start.lost, 1e-9))
-        return mine.violation, dominated[place], sum(shares), numbers[place]
+        return mine.violation, dominated[place], max(shares), sum(shares), numbers[place]
 
     return sorted(numbers[place] for place in sorted(range(len(numbers)), key=key)[:count])
