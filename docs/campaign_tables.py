@@ -158,16 +158,19 @@ def gained() -> str:
 
 
 def judged() -> str:
-    """The default controller on encounters that nothing was chosen by, a line a sensor."""
+    """The default controller on encounters that nothing was chosen by, a line a sensor; and beside the plain stop."""
     found = {f"default, {name}": committed(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
+    alone = {"controllers": found, "references": []}
     tables = []
-    for measures in (
-        "contacts, moving, towards, over_limit, unseen, furniture, self",
-        "distance_median, energy_mean, lost_time_mean, suspensions_mean, reversals_mean",
+    for measures, summary in (
+        ("contacts, moving, towards, over_limit, unseen, furniture, self", alone),
+        ("distance_median, energy_mean, lost_time_mean, suspensions_mean, reversals_mean", alone),
+        ("less stop: contacts, moving, towards, over_limit, energy_mean, lost_time_mean", committed("judged-stop")),
     ):
-        asked = f"<!-- campaign: {measures} -->\n<!-- campaign: end -->"
-        lines = filled(asked, {"controllers": found, "references": []}).splitlines()
+        lines = filled(f"<!-- campaign: {measures} -->\n<!-- campaign: end -->", summary).splitlines()
         tables.append("\n".join(lines[2:-2]))
+    paired = committed("judged-stop")["trials"]["finished"]
+    tables.insert(2, f"The difference to `stop`, ideal sensors, in the first {paired:,} of these, trial by trial:")
     return "\n\n".join(tables)
 
 
