@@ -17,7 +17,7 @@ from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.problem import Law
 from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.recovery.recovery import RecoveryRules
-from qpsafe.robot.loader import bundled_robots, load_robot
+from qpsafe.robot.loader import bundled_robots, find_robot, load_robot
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
@@ -104,8 +104,8 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
 
 def _found_by(robot: Robot) -> str:
     """What `load_robot` finds the robot by: a bundled name, its folder, or its model file."""
-    if robot.name in bundled_robots():
-        return robot.name
+    if robot.name in bundled_robots() and find_robot(robot.name).parent.samefile(robot.folder):
+        return robot.name  # not of a copy that has kept the name
     return str((robot.folder if (robot.folder / "robot.toml").is_file() else robot.model_path).resolve())
 
 

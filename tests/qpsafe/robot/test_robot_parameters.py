@@ -141,10 +141,9 @@ def test_what_reproduces_the_source_uses_its_thresholds(folder: Path) -> None:
 def test_a_recorded_run_remembers_whose_parameters_it_had(folder: Path) -> None:
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
     from qpsafe.sim.replay.settings import experiment_of, settings_of
-    from qpsafe.sim.stories.steps import StoryTable
-    from qpsafe.sim.stories.story import Story
+    from qpsafe.sim.stories.file import load_story
 
-    story = Story(StoryTable(title="nobody", duration=1.0), floor=-0.8)
+    story = load_story("examples/two_people.toml", floor=-0.8)
     for parameters, delta in (("robot", 12.5), ("paper", 11.5)):
         robot = qpsafe.load_robot(folder, parameters=parameters)
         again = experiment_of(settings_of(FixedExperiment(robot, story=story, duration=1.0)))
