@@ -69,9 +69,11 @@ class Gate(Fixed):
 
     def notes(self) -> tuple[str, ...]:
         """Doubts about the geometry that it measures with, in words; reported once."""
-        bare, unsaid = bare_links(self.robot).names, self._unsaid
+        if not self._unsaid:
+            return ()
         self._unsaid = False
-        if not (unsaid and bare):
+        bare = bare_links(self.robot).names
+        if not bare:
             return ()
         return (f"the model has no collision geometry here: only a line without thickness is kept from people, along "
                 f"{', '.join(bare)}",)  # fmt: skip
