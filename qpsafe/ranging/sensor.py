@@ -1,9 +1,9 @@
-"""What a sensor of many zones is: where it sits, where its zones look, how far and how often."""
+"""What a sensor of many zones is: where it sits, where its zones look, how far and how often; and its images."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from qpsafe.ranging.image import RangeImage
     from qpsafe.robot.robot import Robot
     from qpsafe.sensing.spot import Spot
 
@@ -188,7 +187,6 @@ class RangeSensor:
             valid: Which zones tell anything, likewise; those that are not NaN by default.
             sigma: Standard deviations, likewise or one number [m].
         """
-        from qpsafe.ranging.image import RangeImage
 
         return RangeImage(self, distances, stamp, valid, sigma)
 
@@ -234,6 +232,28 @@ class RangeSensor:
 
     def _refuse(self, key: str, value: object, expected: str) -> None:
         raise ConfigurationError(f"RangeSensor {self.name!r}", key, value, expected)
+
+
+class RangeImage(NamedTuple):
+    """What a sensor of many zones saw at one moment: the one input of everything that ranges.
+
+    It is data: nothing is checked when it is made. `SafetyController.step(images=...)` judges it, and reports what it
+    cannot use.
+
+    Attributes:
+        sensor: Which one: its zones, where it is fixed, how far it looks.
+        distances: Of what is nearest in each zone, along the zone's direction, (z,) or `sensor.shape` [m]. Beyond the
+            sensor's range, +inf included, nothing is in sight (REP 117); NaN where the sensor cannot tell.
+        stamp: When it was taken, by the clock of `step(now=...)` [s].
+        valid: Which zones tell anything, likewise; None: those that are not NaN.
+        sigma: Standard deviation of each distance, likewise or one number [m]; None: the sensor's.
+    """
+
+    sensor: RangeSensor
+    distances: ArrayLike
+    stamp: float
+    valid: ArrayLike | None = None
+    sigma: ArrayLike | None = None
 
 
 def _units(v: Array) -> Array:
