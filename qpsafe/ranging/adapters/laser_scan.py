@@ -113,7 +113,7 @@ class LaserScanner:
 
 def _stamp(scan: Any) -> float:
     """Of a message's header, as ROS 2 or ROS 1 has it [s]; NaN where there is none."""
-    stamp = getattr(getattr(scan, "header", None), "stamp", None)
+    stamp: Any = getattr(getattr(scan, "header", None), "stamp", None)
     try:
         if hasattr(stamp, "nanosec"):
             return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
