@@ -62,6 +62,7 @@ _PUBLIC = {
     "load_cell": "qpsafe.sensing.cell_file",
     "load_converter": "qpsafe.sensing.calibration",
     "load_program": "qpsafe.tasks.program_file",
+    "load_range_sensors": "qpsafe.ranging.sensor_file",
     "load_robot": "qpsafe.robot.loader",
     "load_spots": "qpsafe.sensing.spots",
     "nullspace_velocity": "qpsafe.laws.nullspace",
@@ -100,6 +101,7 @@ if TYPE_CHECKING:
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
     from qpsafe.limits import Box as Box
     from qpsafe.limits import JointLimits as JointLimits
+    from qpsafe.ranging.sensor_file import load_range_sensors as load_range_sensors
     from qpsafe.recovery.returns import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference
     from qpsafe.robot.loader import bundled_robots as bundled_robots

@@ -12,6 +12,7 @@ import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from qpsafe.ranging.sensor_file import ArrayFile
 from qpsafe.robot.schema import RobotFile
 from qpsafe.sensing import calibration, cell_file
 from qpsafe.sensing.spot_file import SpotFile
@@ -27,6 +28,7 @@ ROOTS: dict[str, type[BaseModel]] = {
     "Story": StoryTable,
     "People": PeopleTable,
     "Spots": SpotFile,
+    "Arrays": ArrayFile,
     "Robot": RobotFile,
     "Calibration": calibration._File,
     "Campaign": PlanFile,

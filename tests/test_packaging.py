@@ -206,6 +206,7 @@ def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None
     data = {path.relative_to(ROOT).as_posix() for path in (ROOT / "sim").rglob("*.toml")}
     assert {f"qpsafe/{path}" for path in data} <= names
     assert {f"qpsafe/robots/irb140/{name}" for name in ("robot.xml", "robot.toml", "spots.toml")} <= names
+    assert {f"qpsafe/robots/{name}/spots-vl53l5cx.toml" for name in qpsafe.bundled_robots()} <= names
     information = f"qpsafe-{qpsafe.__version__}.dist-info"
     assert {name.partition("/")[0] for name in names} == {"qpsafe", information}
     assert any(name.startswith(information) and name.endswith("/LICENSE") for name in names)

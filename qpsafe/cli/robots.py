@@ -57,11 +57,13 @@ def inspect(
 
     from qpsafe.cli.sheet import Sheet
     from qpsafe.danger.thresholds import robot_thresholds
+    from qpsafe.ranging.sensor_file import load_range_sensors, range_sensor_files
     from qpsafe.sensing.spots import load_spots
 
     screen = console(json)
     robot = _load(name)
     spots = load_spots(robot)
+    arrays = {sensor: load_range_sensors(robot, file) for sensor, file in range_sensor_files(robot).items()}
     high, low = robot_thresholds(robot)
     if json:
         print_json(
@@ -81,6 +83,7 @@ def inspect(
                 "frames": robot.frame_names,
                 "wire": robot.wire_frames,
                 "spots": spots.names if spots else [],
+                "range_sensors": {sensor: [item.name for item in items] for sensor, items in arrays.items()},
                 "tools": robot.tool_frames,
                 "held": {joint: value for joint, (value, _) in robot.held.items()},
                 "danger": {"delta": high.delta, "delta_f": low.delta},
@@ -100,6 +103,10 @@ def inspect(
     if spots is not None:
         ranges = f"range {spots.range_min.min()} to {spots.range_max.max()} m"
         screen.print(f"spots:  {len(spots)}, {ranges}: {', '.join(spots.names)}")
+    for sensor, items in arrays.items():
+        zones = ", ".join(sorted({f"{item.shape[0]} x {item.shape[1]} zones" for item in items}))
+        ranges = f"{zones}, range {min(i.range_min for i in items)} to {max(i.range_max for i in items)} m"
+        screen.print(f"arrays: {len(items)} {sensor}, {ranges}: {', '.join(item.name for item in items)}")
     screen.print("tools:  " + ", ".join(robot.tool_frames))
     screen.print(f"danger: Δ = {high.delta:g}, Δ_f = {low.delta:g}")
     for note in robot.notes:

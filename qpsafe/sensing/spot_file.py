@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 _Finite = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(strict=True, gt=0.0, le=1e3, allow_inf_nan=False)]
-_Angle = Annotated[float, Field(strict=True, ge=0.0, le=90.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0.0, le=1e3, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=0.0, le=90.0, allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]
 
 #: A spot this deep inside its own link looks at nothing but the link [m].
@@ -43,19 +43,22 @@ class SpotTable(_Table):
     position: _Vector
     direction: _Vector | None = None
     rotation: tuple[_Vector, _Vector, _Vector] | None = None
-    range_min: _Positive | None = None
-    range_max: _Positive | None = None
-    field_of_view: _Angle | None = None
+    range_min: Positive | None = None
+    range_max: Positive | None = None
+    field_of_view: Angle | None = None
 
 
 class SpotFile(_Table):
     """Contents of a `spots.toml`: what all spots have in common [m, deg], and the spots."""
 
     sensor: str
-    range_min: _Positive
-    range_max: _Positive
-    field_of_view: _Angle = 0.0
+    range_min: Positive
+    range_max: Positive
+    field_of_view: Angle = 0.0
     spot: list[SpotTable]
+
+
+_File = TypeVar("_File", bound=SpotFile)
 
 
 def read_spots(path: Path, robot: Robot) -> list[Spot]:
@@ -70,17 +73,31 @@ def read_spots(path: Path, robot: Robot) -> list[Spot]:
             does not have, a direction that is not a unit vector, a rotation that is none, an empty range, two spots
             of one name, a spot inside its own link.
     """
-    file = _parse(path)
+    return read_tables(path, robot, SpotFile)[1]
+
+
+def read_tables(path: Path, robot: Robot, kind: type[_File]) -> tuple[_File, list[Spot]]:
+    """A file that holds spots and may say more about them, and its spots, checked as by `read_spots`.
+
+    Args:
+        path: The file.
+        robot: Robot that carries the spots.
+        kind: What it may say.
+
+    Raises:
+        RobotFileError: As `read_spots`.
+    """
+    file = _parse(path, kind)
     spots = [_spot(path, f"spot[{i}] ({table.name})", table, file, robot) for i, table in enumerate(file.spot)]
     names = [spot.name for spot in spots]
     for i, name in enumerate(names):
         if name in names[:i]:
             raise RobotFileError(path, f"spot[{i}].name", name, "a name of its own")
     _check_outside(path, spots, robot)
-    return spots
+    return file, spots
 
 
-def _parse(path: Path) -> SpotFile:
+def _parse(path: Path, kind: type[_File]) -> _File:
     try:
         text = read_bounded(path)
     except OSError as error:
@@ -88,7 +105,7 @@ def _parse(path: Path) -> SpotFile:
     except ValueError as error:
         raise RobotFileError(path, "file", str(path), f"text in UTF-8 ({error})") from None
     try:
-        return SpotFile.model_validate(toml_table(text))
+        return kind.model_validate(toml_table(text))
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(path, "file", str(path), f"valid TOML ({error})") from None
     except ValidationError as error:

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
+from qpsafe.ranging.sensor_file import read_range_sensors
 from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.calibration import calibration_text, fit_curve, read_calibration
 from qpsafe.sensing.sharp import SharpCurve
@@ -66,6 +67,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "cell": (qpsafe.load_cell, CELL),
     "story": (load_story, (ROOT / "examples/two_people.toml").read_text()),
     "spots": (lambda path: SpotArray.load(path, ROBOT), (ROBOT.folder / "spots.toml").read_text()),
+    "arrays": (lambda path: read_range_sensors(path, ROBOT), (ROBOT.folder / "spots-vl53l5cx.toml").read_text()),
     "robot": (read_robot, (ROBOT.folder / "robot.toml").read_text()),
     "calibration": (read_calibration, CURVES),
 }
