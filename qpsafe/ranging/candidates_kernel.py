@@ -136,27 +136,31 @@ def place_all(
     return total
 
 
-@entry(types.int64(_two, _whole, _whole, _any, types.int64, types.float64, _whole, _whole))
+@entry(types.int64(_two, _whole, _whole, _any, types.int64, types.float64, _whole, types.int64[:, :, ::1], _whole))
 def choose(
-    points: Array, links: Index, sensors: Index, danger: Array, most: int, apart: float, marks: Index, chosen: Index
-) -> int:
+    points: Array, links: Index, sensors: Index, danger: Array, most: int, apart: float, marks: Index, used: Index,
+    chosen: Index,
+) -> int:  # fmt: skip
     """Choose the points that count in eq. (8): of each link and sensor the most dangerous ones, and nothing twice.
+
+    A sensor that sees what was chosen already has had its say, so that one more sensor that sees the same changes
+    nothing.
 
     Args:
         points, links, sensors, danger: Of p points, see `place_all`.
         most: How many of each link and sensor.
-        apart: Of points of one link that are as near to each other as that only the most dangerous one counts,
-            whoever saw them [m].
+        apart: Points of one link that are as near to each other as that are one thing [m].
         marks: To work in (p,).
+        used: To work in (2, s, links): how often a sensor was heard for a link, and by which choice last.
         chosen: Filled with their numbers, in falling order of danger (p,).
 
     Returns:
         How many were chosen.
     """  # fmt: skip
-    count = points.shape[0]
+    count, total = points.shape[0], 0
+    used[:] = 0
     for i in range(count):
         marks[i] = 0
-    total = 0
     while True:
         best = -1
         for i in range(count):
@@ -164,14 +168,14 @@ def choose(
                 best = i
         if best < 0:
             return total
-        marks[best], chosen[total] = 2, best
+        chosen[total], link, b = best, links[best], row(points, best)
         total += 1
-        taken = 0
-        for i in range(total):
-            taken += links[chosen[i]] == links[best] and sensors[chosen[i]] == sensors[best]
-        b = row(points, best)
         for i in range(count):
-            if marks[i] == 0 and links[i] == links[best]:
-                w = add(row(points, i), -1.0, b)
-                if dot(w, w) <= apart * apart or (taken >= most and sensors[i] == sensors[best]):
-                    marks[i] = 1
+            w = add(row(points, i), -1.0, b)
+            if i == best or (marks[i] == 0 and links[i] == link and dot(w, w) <= apart * apart):
+                marks[i], who = 1, sensors[i]
+                if used[1, who, link] != total:
+                    used[0, who, link], used[1, who, link] = used[0, who, link] + 1, total
+        for i in range(count):
+            if links[i] == link and used[0, sensors[i], link] >= most:
+                marks[i] = 1

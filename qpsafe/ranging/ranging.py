@@ -85,13 +85,13 @@ class RangeSensing(Fixed):
         self._placed = np.empty((total, 3)), np.empty(total, dtype=np.int64), np.empty((total, 3))
         self._who, self._near, self._leads = np.empty(total, dtype=np.int64), np.empty((total, 3)), np.empty(total)
         self._marks, self._chosen = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+        self._used = np.empty((2, count, links), dtype=np.int64)
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq)
         self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
         self._waiting: deque[Any] = deque()
-        self._now = 0.0
-        self.unseen: tuple[str, ...] = ()
-        self.stopped = False
+        self._now, self._seen = 0.0, np.zeros(count)
+        self.reset()
 
     @property
     def room(self) -> int:
@@ -101,7 +101,8 @@ class RangeSensing(Fixed):
     @property
     def severity(self) -> str:
         """`clear`, `capped` or `stopped`, until acknowledged."""
-        return STOPPED if self.stopped else CAPPED if any(watch.dead for watch in self._watches) else CLEAR
+        dead = self._doubted and any(watch.dead for watch in self._watches)
+        return STOPPED if self.stopped else CAPPED if dead else CLEAR
 
     def reset(self) -> None:
         """Forget everything."""
@@ -110,7 +111,9 @@ class RangeSensing(Fixed):
         self._counts[:] = 0
         self._past.reset()
         self._waiting.clear()
-        self.unseen, self.stopped = (), False
+        self.unseen: tuple[str, ...] = ()
+        self.stopped = self._doubted = False
+        self._begin = True  # sensors are waited for from the next tick on
 
     def acknowledge(self) -> None:
         """A person has looked: sensors that see again are trusted again, a stop they caused is lifted."""
@@ -151,7 +154,15 @@ class RangeSensing(Fixed):
             velocities[:] = 0.0
         danger, _ = field.evaluate(points, wire, velocities)
         count = choose(
-            points, links, self._who[:total], danger, self.rules.most, self.rules.apart, self._marks, self._chosen
+            points,
+            links,
+            self._who[:total],
+            danger,
+            self.rules.most,
+            self.rules.apart,
+            self._marks,
+            self._used,
+            self._chosen,
         )
         chosen = self._chosen[:count]
         return Ranged(
@@ -203,10 +214,12 @@ class RangeSensing(Fixed):
         then = self._robot.at(self._past.at(given.stamp))
         poses, (body, place) = then.body_poses(), self._mounts[who]
         pose = poses[body] @ place
-        count, shown = self._reducers[who](given, pose, poses, wire)
+        fixed = self.sensors[who].mount == WORLD
+        count, shown = self._reducers[who](given, pose, poses, wire, -1 if fixed else body)
         # what has to move for a frozen image to be told: the sensor, or what a fixed one may see of the robot
-        wrong = watch.judged(given, shown, poses if self.sensors[who].mount == WORLD else pose)
+        wrong = watch.judged(given.stamp, self._reducers[who].distances, shown, poses if fixed else pose)
         if not wrong:
+            self._seen[who] = given.stamp
             self._renew(who, given, count)
         return wrong
 
@@ -223,6 +236,12 @@ class RangeSensing(Fixed):
         Raises:
             BadInput: Too many.
         """
+        if self._begin:
+            for watch in self._watches:
+                watch.begin = now
+            self._seen[:], self._begin = now, False
+        if not (self._doubted or (now - self._seen > self._patience).any()):
+            return []
         kinds: dict[str, list[str]] = {}
         unseen = []
         for sensor, watch in zip(self.sensors, self._watches, strict=True):
@@ -230,7 +249,7 @@ class RangeSensing(Fixed):
             if what:
                 kinds.setdefault(what, []).append(sensor.name)
                 unseen.append(sensor.name)
-        self.unseen = tuple(unseen)
+        self.unseen, self._doubted = tuple(unseen), bool(unseen)
         if not unseen:
             return []
         self.stopped |= sum(watch.dead for watch in self._watches) > self._most

@@ -86,6 +86,7 @@ class Reducer:
     Attributes:
         zones: The sensor, or its tiles.
         size: Pixels along the edge of a tile.
+        distances: Of the zones of the last image (z,) [m].
         kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
     """
 
@@ -102,10 +103,11 @@ class Reducer:
         self._stride = farthest_zone(count)
         self._work = np.empty((count, 4)), np.empty((links, count)), np.empty(count, dtype=np.int64)
         self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
+        self.distances = np.empty(count)
         self.kept = np.empty((links * rules.each, 4))
         self._shown = np.zeros(SHOWN, dtype=np.int64)
 
-    def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire) -> tuple[int, Shown]:
+    def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire, carrier: int) -> tuple[int, Shown]:
         """Reduce an image: how many points `kept` holds now, and what the image shows.
 
         Args:
@@ -113,6 +115,7 @@ class Reducer:
             pose: Of the sensor when it was taken (4, 4).
             then: Poses of the robot's bodies when it was taken (b, 4, 4).
             wire: The robot's, now.
+            carrier: The robot's body that the sensor sits on; -1 for none.
         """
         distances, valid, sigma = image.distances, image.valid, image.sigma
         if self.size > 1:
@@ -120,9 +123,10 @@ class Reducer:
             tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
             sigma = np.full(len(nearest), float(sigma.max(initial=0.0)) if sigma.size > 1 else float(sigma[0]))
             distances, valid = nearest, known
+        self.distances = distances
         count = reduce_zones(
             distances, sigma, valid, self.zones.directions, self._slants, pose, self._numbers,
-            wire.starts, wire.ends, then, *self._tables, *self._work, self._each, self._stride, self.kept,
+            wire.starts, wire.ends, then, *self._tables, *self._work, carrier, self._each, self._stride, self.kept,
             self._shown,
         )  # fmt: skip
         return count, Shown(*self._shown.tolist())

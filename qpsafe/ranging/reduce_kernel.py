@@ -8,12 +8,12 @@ wire those that are nearest to it, spread apart, since what lies beside a nearer
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 from numba import types
 
-from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row
+from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
 from qpsafe.robot.kinematics import Index, place
 from qpsafe.sensing import hulls
 from qpsafe.sensing.hulls import within
@@ -46,15 +46,17 @@ def turned(T: Array, v: Vector) -> Vector:
 
 @inline
 def enters(
-    o: Vector, a: Vector, slant: float, shrunk: float, farthest: float, poses: Array, bodies: Index, first: Index,
-    planes: Array, balls: Array,
+    o: Vector, a: Vector, farthest: float, carrier: int, poses: Array, bodies: Index, first: Index, planes: Array,
+    balls: Array,
 ) -> float:  # fmt: skip
-    """How far along a ray known things are met by all of its cone; inf if nowhere.
+    """How far along a ray known things begin; inf if there are none as near as `farthest`.
 
-    Things are taken smaller by `shrunk` and by the cone's radius there. A ray that begins in one is none of its.
+    Those of the body that carries the sensor are left out, and those that the ray begins in.
     """
     nearest = inf
     for h in range(bodies.shape[0]):
+        if bodies[h] == carrier:
+            continue
         T = poses[bodies[h]]
         c = place(T, balls[h, 0], balls[h, 1], balls[h, 2])
         m = add(c, -1.0, o)
@@ -75,17 +77,40 @@ def enters(
             n0, n1, n2 = planes[k, 0], planes[k, 1], planes[k, 2]
             height = n0 * x + n1 * y + n2 * z + planes[k, 3]
             inside = inside and height <= 0.0
-            # height + t rise <= -(shrunk + slant t)
-            rise, height = n0 * u + n1 * v + n2 * w + slant, height + shrunk
+            rise = n0 * u + n1 * v + n2 * w  # inside where height + t rise <= 0
             if rise < 0.0:
                 begin = max(begin, -height / rise)
             elif rise > 0.0:
                 end = min(end, -height / rise)
             elif height > 0.0:
                 end = -1.0
+            if end < begin:
+                break
         if begin <= end and not inside:
             nearest = min(nearest, begin)
     return nearest
+
+
+@inline
+def blocked(
+    o: Vector, a: Vector, slant: float, fat: float, farthest: float, carrier: int, poses: Array, bodies: Index,
+    first: Index, planes: Array, balls: Array,
+) -> float:  # fmt: skip
+    """How far a cone can be looked into at most before known things, which fill all of it; inf if they do not.
+
+    What a zone reads is about the distance along its axis, and no more than half of the way to the far edge beyond.
+    """
+    middle = enters(o, a, farthest, carrier, poses, bodies, first, planes, balls)
+    if middle == inf:
+        return inf
+    u = (0.0, a[2], -a[1]) if abs(a[0]) < 0.8 else (-a[2], 0.0, a[0])
+    u = scale(1.0 / sqrt(dot(u, u)), u)
+    v, wide, edge = cross(a, u), sqrt(0.5) * (slant + fat / max(middle, fat)), middle
+    for i in range(4):
+        b = add(add(a, wide if i < 2 else -wide, u), wide if i % 2 else -wide, v)
+        b = scale(1.0 / sqrt(dot(b, b)), b)
+        edge = max(edge, enters(o, b, farthest, carrier, poses, bodies, first, planes, balls))
+    return 0.5 * (middle + edge) + fat
 
 
 _ints = types.Array(types.int64, 1, "C", readonly=True)
@@ -96,8 +121,8 @@ _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1
 @entry(
     types.int64(
         readable(1), readable(1), types.Array(types.boolean, 1, "A", readonly=True), _two, readable(1), _two,
-        readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole, types.int64, types.int64,
-        _outs, _whole,
+        readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole,
+        types.int64, types.int64, types.int64, _outs, _whole,
     ),
     hulls,
 )  # fmt: skip
@@ -119,6 +144,7 @@ def reduce_zones(
     found: Array,
     away: Array,
     zones: Index,
+    carrier: int,
     each: int,
     stride: int,
     kept: Array,
@@ -135,6 +161,7 @@ def reduce_zones(
         poses: Of the robot's bodies when the image was taken (b, 4, 4).
         bodies, first, planes, balls: The robot itself and known obstacles, see `HullSet.tables`.
         found, away, zones: To work in: (z, 4), (links, z), (z,).
+        carrier: The robot's body that the sensor sits on; -1 for none.
         each: How many points a link keeps.
         stride: Of so many zones one is asked whether it sees through what is known.
         kept: Filled, at least links · each rows.
@@ -159,10 +186,10 @@ def reduce_zones(
         wrong = numbers[DEVIATIONS] * sigma[i]
         fat = numbers[TOLERANCE] + wrong
         if i % stride == 0:
-            surface = enters(o, a, slants[i], fat, min(numbers[FARTHEST], 1e3), poses, bodies, first, planes, balls)
+            surface = blocked(o, a, slants[i], fat, numbers[FARTHEST], carrier, poses, bodies, first, planes, balls)
             if surface < inf:
                 shown[EXPECTED] += 1
-                if d > surface + fat:
+                if d > surface:
                     shown[THROUGH] += 1
         if d > numbers[FARTHEST]:
             continue

@@ -32,7 +32,7 @@ class RangeRules(Fixed):
     """
 
     def __init__(
-        self, most: int = 1, *, apart: float = 0.08, each: int = 3, spread: float = 0.04, reach: float = 2.0,
+        self, most: int = 1, *, apart: float = 0.08, each: int = 2, spread: float = 0.04, reach: float = 2.0,
         deviations: float = 3.0, through: float = 0.3, few: int = 4, misplaced: int = 3, dense: int = 5000,
         support: int = 3, budget: int = 400_000,
     ) -> None:  # fmt: skip

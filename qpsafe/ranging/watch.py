@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
-    from qpsafe.ranging.judge import Usable
     from qpsafe.ranging.reduce import Shown
     from qpsafe.ranging.rules import RangeRules
     from qpsafe.ranging.sensor import RangeSensor
@@ -38,6 +37,7 @@ class SensorWatch:
     Attributes:
         stamp: Of the last image that was taken [s]; -inf before the first.
         good: Of the last image that could be used [s].
+        begin: Since when images are waited for [s].
         dead: Until acknowledged.
         late: How many images came after a newer one, and were left out.
     """
@@ -49,9 +49,9 @@ class SensorWatch:
 
     def reset(self) -> None:
         """Forget everything."""
-        self.stamp, self.good, self.begin = -inf, -inf, inf
+        self.stamp, self.good, self.begin = -inf, -inf, -inf
         self.dead, self.late, self._through = False, 0, 0
-        self._last, self._where = np.empty(0), np.empty(0)
+        self._last, self._where, self._since, self._same = np.empty(0), np.empty(0), inf, 0
 
     def acknowledge(self, now: float) -> None:
         """A person has looked: the sensor is trusted again if it sees."""
@@ -68,21 +68,22 @@ class SensorWatch:
             return "late"
         return ""
 
-    def judged(self, image: Usable, shown: Shown, where: Array) -> str:
+    def judged(self, stamp: float, distances: Array, shown: Shown, where: Array) -> str:
         """What is wrong with what an image shows; nothing: ''.
 
         Args:
-            image: The image.
+            stamp: When it was taken [s].
+            distances: Of its zones, or tiles (z,) [m].
             shown: What it shows.
             where: What has moved if an image has to be another one: poses of the sensor, or of the robot's bodies.
         """
-        self.stamp = image.stamp
+        self.stamp = stamp
         wrong = ""
         if shown.impossible:
             wrong = f"{counted(shown.impossible, 'zone')} below zero"
         elif not shown.valid:
             wrong = "blind in all zones"
-        elif self._is_frozen(image.distances, shown, where):
+        elif self._is_frozen(stamp, distances, shown, where):
             wrong = "frozen"
         else:
             many = shown.expected >= self._rules.few and shown.through > self._rules.through * shown.expected
@@ -90,26 +91,33 @@ class SensorWatch:
             if self._through >= self._rules.misplaced:
                 wrong = f"sees through known things in {shown.through} of {shown.expected} zones: shifted or misplaced"
         if not wrong:
-            self.good = image.stamp
+            self.good = stamp
         return wrong
 
-    def _is_frozen(self, distances: Array, shown: Shown, where: Array) -> bool:
+    def _is_frozen(self, stamp: float, distances: Array, shown: Shown, where: Array) -> bool:
         same = shown.hits > 0 and np.array_equal(distances, self._last, equal_nan=True)
         if not same:
-            self._last, self._where = distances.copy(), where
+            self._last, self._where, self._since, self._same = distances.copy(), where, stamp, 0
+            return False
+        self._same += 1
+        if self._same < 2 or stamp - self._since < self._sensing.stuck_after:
             return False
         if self._sensor.mount == "world" and not shown.own:  # nothing before it needs to have moved
             return False
         return bool(np.abs(where - self._where).max(initial=0.0) >= self._sensing.stuck_motion)
 
+    @property
+    def seen(self) -> float:
+        """Until when the sensor was known to see [s]: its last usable image, or when images were first waited for."""
+        return max(self.good, self.begin)
+
     def silent(self, now: float) -> bool:
         """Whether nothing usable has come for too long."""
-        return now - max(self.good, self.begin) > self._patience
+        return now - self.seen > self._patience
 
     def look(self, now: float) -> str:
         """What is wrong with the sensor now, in words; nothing: ''."""
-        self.begin = min(self.begin, now)
-        since = now - max(self.good, self.begin)
+        since = now - self.seen
         if since > self._patience + self._sensing.dead_after:
             self.dead = True
         if since > self._patience:
