@@ -149,7 +149,13 @@ class PlacementWorld:
         return found, best
 
     def put(self, batch: Any, q: Array, capsules: Array) -> None:
-        """Put the robots of a batch to q (k, n) and their dummies to capsules (k, 17, 2, 3)."""
+        """Put the robots and dummies of a batch in place.
+
+        Args:
+            batch: A `mujoco.batch.Batch` of this model with at least k simulations.
+            q: Of the robots, (k, n) [rad].
+            capsules: Ends of the dummies', (k, 17, 2, 3) [m].
+        """
         k, qpos = len(q), batch.bind("qpos")
         qpos[:k, self._held[0]] = self._held[1]
         qpos[:k, self._q] = q
