@@ -31,7 +31,7 @@ tick
 controller
 batch
 plugins placement irc5 irc5.records bench check
-sim.people sim.world sim.engine
+sim.people sim.world sim.engine sim.ranging
 sim.stories sim.recording
 sim.drawing
 sim.experiments.shared

@@ -32,7 +32,8 @@ class RunLog:
     Attributes:
         dt: Tick [s].
         time: (N,) [s].
-        distances: Readings of the spots (N, k) [m], +inf where nothing was seen.
+        distances: Readings of the spots, and the nearest in each range sensor's last image (N, k) [m]; +inf where
+            nothing was seen.
         cdf_n: (N,).
         m, f: Switches (N,).
         regime, phase, status: (N,) words.
@@ -45,7 +46,7 @@ class RunLog:
         board_distance, person_distance: Smallest true distance robot-board, robot-person (N,) [m].
         solve_time: Wall time of `step` (N,) [s]; the only part that differs between equal runs.
         messages: (tick, message) of everything unusual.
-        spot_names: (k,).
+        spot_names: Of the spots, then of the range sensors (k,).
         metrics: What the user measured, (N,) or (N, k) by name; see `Control.metrics`.
     """
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.recording.run_file import RunFile, RunFileError, fingerprint, versions
-from qpsafe.sim.replay.settings import Experiment, controller_of, experiment_of
+from qpsafe.sim.replay.settings import Experiment, experiment_of, loop_of
 from qpsafe.tick import Tick
 
 #: Called with every tick of a replay: its number and the tick.
@@ -79,7 +79,8 @@ def replay(run: RunFile, watcher: Watcher | None = None, experiment: Experiment 
         RunFileError: The recorded inputs do not fit the robot.
     """
     experiment = experiment or experiment_of(run.header["settings"])
-    controller, arrays = controller_of(experiment), run.arrays
+    loop, arrays = loop_of(experiment), run.arrays
+    controller = loop.controller
     n, spots = experiment.robot.nq, len(run.header["spots"])
     for name, width in (("q", n), ("qd", n), ("q_ref", n), ("qd_ref", n), ("distances", spots)):
         if arrays[name].shape[1] != width:
@@ -88,7 +89,7 @@ def replay(run: RunFile, watcher: Watcher | None = None, experiment: Experiment 
     first: Difference | None = None
     different, largest = 0, 0.0
     for k in range(run.ticks):
-        tick = controller.step(arrays["q"][k], arrays["qd"][k], arrays["distances"][k])
+        tick = loop.asked_again(k, arrays["q"][k], arrays["qd"][k], arrays["distances"][k])
         answers = _answers(tick)
         wrong = [name for name, value in answers.items() if not _equal(value, arrays[name][k])]
         if tick.messages != messages.get(k, ()):

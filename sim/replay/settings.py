@@ -115,11 +115,14 @@ def _spots(robot: Robot) -> str | None:
     return None if path is None else path.name if path.parent == robot.folder else str(path.resolve())
 
 
+def loop_of(experiment: Experiment) -> FixedLoop | PickLoop:
+    """What a run of the experiment starts with."""
+    return PickLoop(experiment) if isinstance(experiment, PickPlaceExperiment) else FixedLoop(experiment)
+
+
 def controller_of(experiment: Experiment) -> SafetyController:
     """The controller that a run of the experiment starts with."""
-    if isinstance(experiment, PickPlaceExperiment):
-        return PickLoop(experiment).controller
-    return FixedLoop(experiment).controller
+    return loop_of(experiment).controller
 
 
 def law_settings(law: Law | None) -> dict[str, Any] | None:

@@ -10,7 +10,6 @@ import typer
 from qpsafe.cli.common import (
     LawName,
     ProjectionName,
-    SensorName,
     console,
     make_law,
     print_json,
@@ -52,8 +51,13 @@ def fixed(
         float | None, typer.Option(min=0.1, max=600.0, help="Length of the run [s]; 60, or the story's.")
     ] = None,
     sensor: Annotated[
-        SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
-    ] = SensorName.ideal,
+        str,
+        typer.Option(
+            help="ideal: perfect distances at the spots; sharp: simulated Sharp sensors; vl53l5cx: arrays of 8x8 zones "
+            "in their place; depth: a depth camera in the cell. Joined by +, as sharp+depth, several are there; "
+            "vl53l5cx-ideal and depth-ideal have no noise."
+        ),
+    ] = "ideal",
     cap: Annotated[
         float | None, typer.Option(min=0.1, help="Cap the danger field at this value; by default there is no cap.")
     ] = None,
@@ -77,8 +81,13 @@ def fixed(
     from qpsafe.sim.experiments.encounter import encounter
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
     from qpsafe.sim.experiments.fixed.stage import robot_stage
+    from qpsafe.sim.ranging.sets import sensor_kinds
     from qpsafe.sim.stories.file import load_story
 
+    if sensor_kinds(sensor).spots == "perfect":
+        raise ConfigurationError(
+            "qpsafe demo fixed", "sensor", sensor, "sensors: a run is remembered by their readings"
+        )
     if story is not None:
         load_story(story)  # a wrong one is refused before anything is written
 
@@ -93,11 +102,12 @@ def fixed(
             lag=lag,
             duration=duration or (60.0 if told is None else told.duration),
             story=told,
-            sensor=sensor.value,
+            sensor=sensor,
             cap=cap,
         )
 
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
+    title += "" if sensor == "ideal" else f", sensors {sensor}"
     if robot == "all":
 
         def run(experiment: FixedExperiment, folder: Path) -> Report:
@@ -109,7 +119,7 @@ def fixed(
         report, log, files = _once(experiment, title, out, video, view, screen)
         kept, near = report.kept, encounter(log, experiment)
         if json:
-            print_json(report.to_dict() | {"encounter": near.to_dict()})
+            print_json(report.to_dict() | {"sensor": sensor, "encounter": near.to_dict()})
         else:
             show(report, title, screen)
             if story is not None:
@@ -165,7 +175,7 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
         distance_figure(log, without, out / "distance.png")
     else:
         encounter_figure(log, out / "distance.png")
-    write_text(out / "report.json", json_text(report.to_dict()) + "\n")
+    write_text(out / "report.json", json_text(report.to_dict() | {"sensor": experiment.sensor}) + "\n")
     return report
 
 

@@ -40,12 +40,11 @@ def observed(
     """
     from qpsafe.danger.thresholds import robot_activation
     from qpsafe.errors import MissingExtraError
-    from qpsafe.sensing.spots import load_spots
     from qpsafe.sim.drawing.film import Film, Viewer
     from qpsafe.sim.drawing.gl import gl_available
+    from qpsafe.sim.ranging.sets import lines_of_sight
 
-    spots = load_spots(experiment.robot)
-    assert spots is not None
+    spots = lines_of_sight(experiment.sensor, experiment.robot)
     activation = robot_activation(experiment.robot)
     with ExitStack() as stack:
         observers: list[Any] = [] if states is None else [states.observe]

@@ -71,11 +71,10 @@ class Notes:
 
     def __init__(self, experiment: FixedExperiment, loop: FixedLoop) -> None:
         self._experiment, self._plant = experiment, loop.plant
-        controller = loop.controller
-        if controller.spots is None or experiment.sensor == "perfect":
-            expected = "ideal or sharp: a run is remembered by what its sensors read"
+        if not loop.sensor_names:
+            expected = "not perfect: a run is remembered by what its sensors read"
             raise ConfigurationError("FixedExperiment", "sensor", experiment.sensor, expected)
-        self._recorder = Recorder(controller.dt, controller.spots.names)
+        self._recorder = Recorder(loop.controller.dt, loop.sensor_names)
 
     def add(self, moment: Moment, gaps: tuple[Distance, Distance]) -> None:
         """Write down a tick.

@@ -16,6 +16,7 @@ from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.choreography import Choreography
+from qpsafe.sim.ranging.sets import range_sensors, sensor_kinds
 from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 
@@ -41,7 +42,8 @@ class FixedSettings(Control):
         limits: Whether the joint limits are on.
         duration: Length [s].
         sensor: ``ideal`` distances, those of ``sharp`` sensors, or ``perfect``: where everybody is nearest to each
-            link, as points; that needs no sensors.
+            link, as points; that needs no sensors. Or ``vl53l5cx`` arrays in the spots' place, or a ``depth`` camera;
+            joined by +, as in ``sharp+depth``, they are there together. See `qpsafe.sim.ranging.sets`.
         rules: What counts as danger, and what sick sensors do; None for the default, see above.
         cap: Cap on the danger field (`DangerBarrier`), None for none.
         choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
@@ -66,7 +68,7 @@ class FixedSettings(Control):
         super().__post_init__()
         if self.story is None:
             self.robot = self.robot.with_parameters("paper")
-        if self.robot.spots_path is None and self.sensor != "perfect":
+        if self.robot.spots_path is None and sensor_kinds(self.sensor).spots in ("ideal", "sharp"):
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:
             self.choreography = robot_stage(self.robot).choreography
@@ -74,6 +76,11 @@ class FixedSettings(Control):
     def parts(self) -> dict[str, Any]:
         """Parts of the controller as arguments of `SafetyController`; None for its default."""
         found = super().parts() | {"sensing": self.rules, "recovery": self.recovery}
+        kinds = sensor_kinds(self.sensor)
+        if kinds.ranging:
+            found["range_sensors"] = range_sensors(kinds.ranging, self.robot)[0]
+            if kinds.spots is None:
+                found["spots"] = "off"
         if self.story is None:
             paper = {"evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper()}
             found |= {name: part for name, part in paper.items() if found[name] is None}

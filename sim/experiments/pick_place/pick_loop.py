@@ -21,6 +21,7 @@ from qpsafe.sim.world.sensor import make_sensor
 from qpsafe.sim.world.tool_axis import tool_axis, turned_to
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
+from qpsafe.tick import Tick
 
 GRIP, RELEASE = "grip", "release"  # events of the program
 SETTLED = 0.02  # a screw slower than this rests [m/s]
@@ -109,6 +110,17 @@ class PickLoop:
         # reference.q holds at the end of this period: the servo is told where it starts from
         plant.apply(reference.q - controller.dt * reference.qd, reference.qd)
         return Moment(tick, q, qd, distances, state)
+
+    def asked_again(self, k: int, q: Array, qd: Array, distances: Array) -> Tick:
+        """The answer at a tick of a recorded run.
+
+        Args:
+            k: The tick, one after another from 0.
+            q: Measured then (n,) [rad].
+            qd: Measured then (n,) [rad/s].
+            distances: Of the spots (k,) [m].
+        """
+        return self.controller.step(q, qd, distances)
 
     def advance(self) -> None:
         """Simulate one period, and see which screws have come to rest."""

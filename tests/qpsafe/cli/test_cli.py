@@ -70,6 +70,25 @@ def test_demo_takes_other_sensors(tmp_path: Path) -> None:
         assert isinstance(run(app, [*quick, *wrong]).exception, QpsafeError)
 
 
+@pytest.mark.parametrize("sensor", ["vl53l5cx", "ideal+depth"])
+def test_demo_takes_sensors_of_many_zones(sensor: str, tmp_path: Path) -> None:
+    """The report says which; the run is replayed bit by bit, its images made again."""
+    quick = ["demo", "fixed", "--duration", "0.4", "--no-video", "--out", str(tmp_path / "a")]
+    result = run(app, [*quick, "--sensor", sensor, "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["sensor"] == sensor
+    assert read_run(tmp_path / "a" / "run.npz").header["settings"]["sensor"] == sensor
+    assert run(app, ["replay", str(tmp_path / "a" / "run.npz")]).exit_code == 0
+    assert all(word in run(app, ["demo", "fixed", "--help"]).output for word in ("vl53l5cx", "depth"))
+
+
+@pytest.mark.parametrize("sensor", ["radar", "perfect", "ideal+sharp"])
+def test_demo_refuses_other_sensors_before_anything_runs(sensor: str, tmp_path: Path) -> None:
+    result = run(app, ["demo", "fixed", "--sensor", sensor, "--out", str(tmp_path / "new")])
+    assert isinstance(result.exception, QpsafeError)
+    assert not (tmp_path / "new").exists()
+
+
 def test_demo_without_opengl_says_so_in_one_line(without_display: Callable[..., Any], tmp_path: Path) -> None:
     done = without_display("demo", "fixed", "--duration", "0.2", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
