@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement.objective import SensorName
+from qpsafe.ranging.adapters.vl53l5cx import FIELD_OF_VIEW, vl53l5cx
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.sensing.rules import SensingRules
 
@@ -69,9 +70,15 @@ class Sensor(NamedTuple):
             raise ConfigurationError("placement", "sensor.zones", self.zones, "as many rows as columns")
 
 
-#: VL53L5CX: 8 x 8 zones of a square of 45 degrees (63 along the diagonal), up to 4 m, 15 Hz, by its maker's data sheet;
-#: its deviation is chosen by us, from the accuracy stated for near white targets.
+def _array_of(sensor: RangeSensor, edge: float) -> Sensor:
+    """What of an array is for its placement, and for its file."""
+    return Sensor(
+        sensor.name, sensor.range_min, sensor.range_max, edge, sensor.shape, round(1.0 / sensor.period, 9), sensor.sigma
+    )
+
+
+#: Figures of the VL53L5CX: see `qpsafe.ranging.adapters.vl53l5cx`.
 SENSORS = {
     SensorName.sharp: Sensor(),
-    SensorName.vl53l5cx: Sensor("VL53L5CX", 0.02, 4.0, float(np.deg2rad(45.0)), (8, 8), 15.0, 0.015),
+    SensorName.vl53l5cx: _array_of(vl53l5cx("VL53L5CX"), FIELD_OF_VIEW),
 }

@@ -99,7 +99,7 @@ def figure_9(result: Study, path: Path, title: str) -> None:
         axes[3].set_xlabel("number of arrays" if result.candidates.sensor.is_array else "number of spots")
         axes[3].set_xlim(0, len(curve.order))
         figure.suptitle(
-            f"{plain(title)}, {result.candidates.sensor.name}: {counted(len(curve.order), 'node')}. Thick: "
+            f"{plain(title)}, {result.candidates.sensor.name}: {counted(len(curve.order), 'node')}.\nThick: "
             f"{counted(independent.pairs, 'independent pair')} with 95 % bands; thin: optimised pairs",
             fontsize=9,
         )
