@@ -12,9 +12,9 @@ from math import inf, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
-from qpsafe.ranging import prediction, reduce_kernel
+from qpsafe.ranging import prediction
+from qpsafe.ranging.nearest_kernel import to_link
 from qpsafe.ranging.prediction import person_speed
-from qpsafe.ranging.reduce_kernel import to_link
 from qpsafe.robot.kinematics import Index
 
 #: Columns of a kept point: place, velocity, how wrong the place may be, when it was seen, when it was lost (inf: not).
