@@ -83,7 +83,7 @@ def renew(
         _out,
         _out,
     ),
-    reduce_kernel,
+    nearest_kernel,
     prediction,
     *prediction.USES,
 )
