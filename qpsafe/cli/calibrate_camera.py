@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def calibrate_camera(
-    recording: Annotated[Path, typer.Argument(help=".npz file, or a folder of them: q and depth, or distances.")],
-    cell: Annotated[Path, typer.Option(help="TOML file of the cell, with a [[camera]] of that name.")],
+    file: Annotated[Path, typer.Argument(help=".npz file, or a folder of them: q, and depth or distances.")],
+    cell: Annotated[Path, typer.Argument(help="TOML file of the cell, with a [[camera]] table.")],
     camera: Annotated[str | None, typer.Option(help="Name of the camera; the cell's only one by default.")] = None,
     robot: RobotName = "irb140",
     guess: Annotated[
@@ -54,7 +54,7 @@ def calibrate_camera(
     if write or out is not None:
         with_pose(text, number, sensor.pose)  # whether it can be put there
     found = load_named(robot, screen)
-    images = load_recording(recording, sensor, found)
+    images = load_recording(file, sensor, found)
     result = calibrate.calibrate_camera(found, images, sensor.pose if guess else None)
     good = not result.weak and result.rms <= tolerance
     target = (cell if write else out) if good else None

@@ -139,5 +139,5 @@ def _words(axis: Array) -> str:
     moves = np.linalg.norm(along) >= np.linalg.norm(about)
     v = along if moves else about
     v = v / np.linalg.norm(v) * np.sign(v[np.argmax(np.abs(v))])
-    inside = ", ".join(f"{x:.2f}" for x in v + 0.0)
+    inside = ", ".join(f"{x:.2f}" for x in v.round(2) + 0.0)  # no -0
     return f"{'translation along' if moves else 'rotation about'} ({inside})"
