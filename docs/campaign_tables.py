@@ -21,6 +21,7 @@ PAGES = {
     DOCS.parent / "README.md": "campaign",
     DOCS / "explanation" / "verified-motion.md": "verified",
     DOCS / "how-to" / "coming-from.md": "campaign",
+    DOCS / "how-to" / "fixed-cameras.md": "campaign",
     DOCS / "how-to" / "placement.md": "campaign",
     DOCS / "explanation" / "demo-fixed.md": "campaign",
     DOCS / "explanation" / "demo-path.md": "campaign",

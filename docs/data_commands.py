@@ -30,6 +30,7 @@ COMMANDS = {
     "place-arrays": "place --sensor vl53l5cx --objective nearest --no-exact --json --no-pictures --out {out}",
     "ticks": "bench --json",
     "irc5-faults": "irc5-faults --moments 20 --jobs 1 --json",
+    "camera-calibration": "benchmarks/camera_calibration.py --out {out}",
     "hqp-solvers": "benchmarks/bench_hqp.py --out {out}",
     "hqp-intervals": "benchmarks/hqp_intervals.py --count 20000 --seed 21 --json",
     "stream": "benchmarks/bench_stream.py --duration 60 --busy 0 2 --real-time yes --out {out}",

@@ -204,5 +204,18 @@ def late() -> str:
     return lines(("busy processes", "in time", *names, "p50", "p99", "p99.9", "maximum"), rows)
 
 
+def camera_calibration() -> str:
+    """How well simulated cameras are found, a line a robot."""
+    rows = []
+    for robot, found in measured("camera-calibration")["robots"].items():
+        good = [run for run in found if run["good"]]
+        cells = [
+            f"{median(run[key] for run in good):{form}} ({max(run[key] for run in good):{form}}) {unit}"
+            for key, form, unit in (("place", ".0f", "mm"), ("angle", ".2f", "°"), ("middle", ".1f", "mm"))
+        ]
+        rows.append((f"`{robot}`", *cells, f"{len(good)} of {len(found)}"))
+    return lines(("robot", "camera's place", "its direction", "a place at the robot", "called good"), rows)
+
+
 TABLES = {"path": path, "fast-person": fast_person, "pick": pick, "compare": compare, "place": place, "bench": bench}
-TABLES |= {"hqp-random": hqp_random, "hqp-drift": hqp_drift, "late": late}
+TABLES |= {"hqp-random": hqp_random, "hqp-drift": hqp_drift, "late": late, "camera-calibration": camera_calibration}
