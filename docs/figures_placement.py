@@ -1,4 +1,4 @@
-"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as it is shipped, and arrays beside spots.
+"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as shipped, its pictures, and arrays beside spots.
 
 The last is drawn from docs/data/place.json and place-arrays.json.
 """

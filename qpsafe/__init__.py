@@ -59,6 +59,7 @@ _PUBLIC = {
     "WeightedLaw": "qpsafe.laws.weighted",
     "Wire": "qpsafe.robot.wire",
     "bundled_robots": "qpsafe.robot.loader",
+    "load_cameras": "qpsafe.ranging.cell_cameras",
     "load_cell": "qpsafe.sensing.cell_file",
     "load_converter": "qpsafe.sensing.calibration",
     "load_program": "qpsafe.tasks.program_file",
@@ -101,6 +102,7 @@ if TYPE_CHECKING:
     from qpsafe.laws.weighted import WeightedLaw as WeightedLaw
     from qpsafe.limits import Box as Box
     from qpsafe.limits import JointLimits as JointLimits
+    from qpsafe.ranging.cell_cameras import load_cameras as load_cameras
     from qpsafe.ranging.sensor_file import load_range_sensors as load_range_sensors
     from qpsafe.recovery.returns import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference

@@ -24,7 +24,7 @@ from qpsafe.tasks.program_tables import ProgramFile
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
 ROOTS: dict[str, type[BaseModel]] = {
     "Program": ProgramFile,
-    "Cell": cell_file._Cell,
+    "Cell": cell_file.CellFile,
     "Story": StoryTable,
     "People": PeopleTable,
     "Spots": SpotFile,

@@ -8,6 +8,8 @@ centre = [0.9, 0.0, 0.1]     # robot base frame, m
 [[hull]]
 name = "ramp"
 vertices = [[1.0, 0.0, 0.0], [1.0, 0.4, 0.0], [1.4, 0.0, 0.0], [1.4, 0.4, 0.3]]   # at least four, m
+
+Its `[[camera]]` tables say what looks at the cell; `qpsafe.ranging.cell_cameras.load_cameras` reads them.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sensing.camera_table import KINDS, CameraTable
 from qpsafe.sensing.hulls import Obstacle
-from qpsafe.text.toml_text import TomlText
+from qpsafe.text.toml_text import Keys, TomlText
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Vector = tuple[_Finite, _Finite, _Finite]
@@ -47,19 +50,36 @@ class _Hull(_Table):
         return Obstacle(self.name, np.array(self.vertices))
 
 
-class _Cell(_Table):
+class CellFile(_Table):
+    """Contents of a cell's file."""
+
     box: tuple[_Box, ...] = ()
     hull: tuple[_Hull, ...] = ()
+    camera: tuple[CameraTable, ...] = ()
 
 
-def load_cell(path: str | Path) -> tuple[Obstacle, ...]:
-    """Known obstacles from a file, for `SafetyController(known=...)`.
+def read_cell(path: str | Path) -> tuple[TomlText, CellFile]:
+    """The text of a cell's file, and what it says.
 
     Raises:
         ConfigurationError: Names file, line, key and value of what is wrong.
     """
     text = TomlText.read(Path(path))
-    content = text.checked(_Cell)
+    return text, text.checked(CellFile, _is_key)
+
+
+def _is_key(before: Keys, key: str | int) -> bool:
+    """pydantic names the kind of a camera between its number and its key."""
+    return not (key in KINDS and len(before) == 2 and before[0] == "camera")
+
+
+def load_cell(path: str | Path) -> tuple[Obstacle, ...]:
+    """Known obstacles from a file, for `SafetyController(known=...)`; its cameras are none.
+
+    Raises:
+        ConfigurationError: Names file, line, key and value of what is wrong.
+    """
+    text, content = read_cell(path)
     found = []
     kinds: tuple[tuple[str, tuple[_Box | _Hull, ...]], ...] = (("box", content.box), ("hull", content.hull))
     for kind, items in kinds:

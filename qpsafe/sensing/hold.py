@@ -41,15 +41,18 @@ class PointHold(Fixed):
 
 
 @inline
-def _distance_to_wire(p: Vector, r0: Array, r1: Array) -> float:
-    smallest = np.inf
+def from_wire(p: Vector, r0: Array, r1: Array) -> Vector:
+    """From the nearest point of the wire to p."""
+    smallest, nearest = np.inf, (np.inf, 0.0, 0.0)
     for j in range(r0.shape[0]):
         d, w = add(row(r1, j), -1.0, row(r0, j)), add(p, -1.0, row(r0, j))
         dd = dot(d, d)
         l = min(max(dot(w, d) / dd, 0.0), 1.0) if dd > 0.0 else 0.0
         n = add(w, -l, d)
-        smallest = min(smallest, dot(n, n))
-    return np.sqrt(smallest)
+        nn = dot(n, n)
+        if nn < smallest:
+            smallest, nearest = nn, n
+    return nearest
 
 
 @inline
@@ -101,6 +104,7 @@ def believe(
     length = np.sqrt(dot(way, way))
     if length > step:
         q = add(q, step / length, way)
-        if _distance_to_wire(q, r0, r1) >= nearest:
+        away = from_wire(q, r0, r1)
+        if np.sqrt(dot(away, away)) >= nearest:
             held[i, 1], held[i, 2], held[i, 3] = q
     return True

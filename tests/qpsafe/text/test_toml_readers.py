@@ -39,6 +39,27 @@ centre = [0.9, 0.0, 0.1]
 name = "ramp"
 vertices = [[1.0, 0.0, 0.0], [1.0, 0.4, 0.0], [1.4, 0.0, 0.0], [1.4, 0.4, 0.3]]
 """
+CAMERAS = """[[camera]]
+name = "ceiling"
+kind = "depth"
+resolution = [64, 48]
+field_of_view = [90.0, 60.0]
+position = [1.5, 0.0, 2.6]
+look_at = [0.4, 0.0, 0.3]
+up = [0.0, 0.0, 1.0]
+range_max = 4.0
+rate = 30.0
+[[camera]]
+name = "gate"
+kind = "scanner"
+angle_min = -90.0
+increment = 0.5
+rays = 361
+position = [2.0, 0.0, 0.3]
+quaternion = [0.0, 0.0, 0.0, 1.0]
+range_max = 8.0
+rate = 40.0
+"""
 D = [0.2, 0.3, 0.4, 0.5, 0.6, 0.8]
 CURVES = calibration_text([fit_curve("a", D, SharpCurve().voltage(D))])
 
@@ -65,6 +86,7 @@ def read_robot(path: Path) -> Any:
 READERS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "program": (lambda path: load_program(path, ROBOT), (ROOT / "sim/experiments/path/path.toml").read_text()),
     "cell": (qpsafe.load_cell, CELL),
+    "cameras": (qpsafe.load_cameras, CAMERAS),
     "story": (load_story, (ROOT / "examples/two_people.toml").read_text()),
     "spots": (lambda path: SpotArray.load(path, ROBOT), (ROBOT.folder / "spots.toml").read_text()),
     "arrays": (lambda path: read_range_sensors(path, ROBOT), (ROBOT.folder / "spots-vl53l5cx.toml").read_text()),
