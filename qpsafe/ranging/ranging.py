@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
+from qpsafe.danger.field import DangerField
 from qpsafe.fixed import Fixed
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
+from qpsafe.ranging.checks import checked_sensors
 from qpsafe.ranging.configurations import Configurations
-from qpsafe.ranging.judge import Judge, Usable
+from qpsafe.ranging.judge import Judge
+from qpsafe.ranging.prediction import Foresight
 from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.ranging.reduce import Reducer
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import WORLD, RangeImage, RangeSensor
+from qpsafe.ranging.velocities import MOST, Velocities
 from qpsafe.ranging.watch import SensorWatch
 from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.detection import BadInput
@@ -28,6 +31,7 @@ from qpsafe.sensing.rules import SensingRules
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
+    from qpsafe.robot.wire import Wire
 
 Array = NDArray[np.float64]
 
@@ -80,12 +84,16 @@ class RangeSensing(Fixed):
         self._patience = np.array([sensor.max_age for sensor in self.sensors], dtype=np.float64)
         self._numbers = np.array([
             0.0, self.sensing.hold_time, self.sensing.approach_speed, self.sensing.d_min, PERSON, AHEAD,
+            self.rules.acceleration, self.rules.fastest,
         ])  # fmt: skip
         total = count * room
         self._placed = np.empty((total, 3)), np.empty(total, dtype=np.int64), np.empty((total, 3))
-        self._who, self._near, self._leads = np.empty(total, dtype=np.int64), np.empty((total, 3)), np.empty(total)
+        self._who, self._near = np.empty(total, dtype=np.int64), np.empty((total, 3))
+        self._ages, self._leads = np.empty(total), np.empty(total)
         self._marks, self._chosen = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
         self._used = np.empty((2, count, links), dtype=np.int64)
+        self._tracks = [Velocities(sensor.sigma) for sensor in self.sensors] if self.rules.predict else []
+        self._foresight = Foresight(total)
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq)
         self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
@@ -108,6 +116,8 @@ class RangeSensing(Fixed):
         """Forget everything."""
         for watch in self._watches:
             watch.reset()
+        for tracks in self._tracks:
+            tracks.reset()
         self._counts[:] = 0
         self._past.reset()
         self._waiting.clear()
@@ -145,13 +155,12 @@ class RangeSensing(Fixed):
         self._numbers[0], self._numbers[4] = now, person
         total = place_all(
             self._store, self._counts, self._carriers, self._patience, self._numbers, wire.starts, wire.ends,
-            *self._placed, self._who, self._near, self._leads,
+            *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
         if not total:
             return Ranged(_NONE, _NO_LINKS, _NONE, _NONE, _NO_LEADS, tuple(notes))
         points, links, velocities = (array[:total] for array in self._placed)
-        if not self.sensing.velocities:
-            velocities[:] = 0.0
+        points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
         count = choose(
             points,
@@ -170,7 +179,16 @@ class RangeSensing(Fixed):
             tuple(notes),
         )  # fmt: skip
 
-    def _take_all(self, images: Any, now: float, wire: Any) -> list[str]:
+    def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:
+        """Where points count that come nearer, and their velocities there; at rest by a field of another making."""
+        if not velocities.any():
+            return points, velocities
+        if not self.sensing.velocities or type(field) is not DangerField:
+            return points, np.zeros_like(velocities)
+        elapsed, weights = self._ages[: len(points)] + self.rules.horizon, (field.static, field.kinetic, field.gamma)
+        return self._foresight(points, velocities, elapsed, self.sensing.d_min, wire, weights, field.floor)
+
+    def _take_all(self, images: Any, now: float, wire: Wire) -> list[str]:
         """Take the images that came, as many as there is time for; what is wrong, in words."""
         notes: list[str] = []
         if isinstance(images, RangeImage):
@@ -206,7 +224,7 @@ class RangeSensing(Fixed):
             notes.append("images come faster than they can be taken: the oldest are left out")
         return list(dict.fromkeys(notes))
 
-    def _take(self, who: int, image: RangeImage, now: float, wire: Any) -> str:
+    def _take(self, who: int, image: RangeImage, now: float, wire: Wire) -> str:
         watch, given = self._watches[who], self._judges[who](image)
         wrong = watch.too_old(given.stamp, now)
         if wrong:
@@ -220,13 +238,17 @@ class RangeSensing(Fixed):
         wrong = watch.judged(given.stamp, self._reducers[who].distances, shown, poses if fixed else pose)
         if not wrong:
             self._seen[who] = given.stamp
-            self._renew(who, given, count)
+            velocities = self._still
+            if self._tracks:
+                around = self._reducers[who].around(count, shown.seen, MOST)
+                velocities = self._tracks[who](given.stamp, around, None if fixed else pose)[:count]
+            self._renew(who, given.stamp, count, velocities)
         return wrong
 
-    def _renew(self, who: int, image: Usable, count: int) -> None:
+    def _renew(self, who: int, stamp: float, count: int, velocities: Array) -> None:
         kept = self._reducers[who].kept
         self._counts[who] = renew(
-            self._store[who], self._counts[who], kept, count, self._still, image.stamp, self.sensing.hold_time,
+            self._store[who], self._counts[who], kept, count, velocities, stamp, self.sensing.hold_time,
             2.0 * self.rules.apart,
         )  # fmt: skip
 
@@ -258,26 +280,6 @@ class RangeSensing(Fixed):
             more = "stopped until acknowledged" if self.stopped else "stopped until they see again"
             raise BadInput("; ".join((f"more than {self._most} range sensors do not see: {more}", *notes)))
         return notes
-
-
-def checked_sensors(sensors: Any, robot: Robot) -> tuple[RangeSensor, ...]:
-    """Sensors that a robot's cell can hold.
-
-    Raises:
-        ConfigurationError: None, no sensors, two of one name, or one that does not fit the robot.
-    """
-    where, expected = "SafetyController", "RangeSensors, each with a name of its own"
-    if isinstance(sensors, RangeSensor | str) or not isinstance(sensors, Iterable):
-        raise ConfigurationError(where, "range_sensors", sensors, "a list of " + expected)
-    found: dict[str, RangeSensor] = {}
-    for sensor in sensors:
-        if not isinstance(sensor, RangeSensor) or sensor.name in found:
-            raise ConfigurationError(where, "range_sensors", sensor, expected)
-        sensor.check(robot)
-        found[sensor.name] = sensor
-    if not found:
-        raise ConfigurationError(where, "range_sensors", sensors, "at least one RangeSensor")
-    return tuple(found.values())
 
 
 def _mounted(robot: Robot, sensor: RangeSensor) -> tuple[int, Array]:

@@ -107,6 +107,17 @@ class Reducer:
         self.kept = np.empty((links * rules.each, 4))
         self._shown = np.zeros(SHOWN, dtype=np.int64)
 
+    def around(self, count: int, seen: int, most: int) -> Array:
+        """The points that the last image left, then others that count, evenly chosen, `most` in all (p, 3) [m].
+
+        Args:
+            count: How many points `kept` holds.
+            seen: How many points count.
+            most: p at most, or `count` if that is more.
+        """
+        every = -(-seen // max(most - count, 1)) if seen else 1
+        return np.concatenate((self.kept[:count, :3], self._work[0][:seen:every, :3]))
+
     def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire, carrier: int) -> tuple[int, Shown]:
         """Reduce an image: how many points `kept` holds now, and what the image shows.
 

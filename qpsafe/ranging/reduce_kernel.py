@@ -152,6 +152,8 @@ def reduce_zones(
 ) -> int:
     """Keep the points of an image that matter, (c, 4): place in the world [m], how wrong it may be [m].
 
+    `found` keeps all points that count, as many as `shown[SEEN]` tells.
+
     Args:
         distances, sigma, valid: Of z zones [m].
         directions, slants: Of the zones in the sensor's frame (z, 3), tangents of half their cones (z,).

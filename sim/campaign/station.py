@@ -19,6 +19,7 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
+from qpsafe.sim.campaign.senses import delay
 from qpsafe.sim.campaign.servo import OMEGA
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
@@ -26,6 +27,7 @@ from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.for_robot import line_for
 from qpsafe.sim.experiments.pick_place.cell import Cell
 from qpsafe.sim.experiments.pick_place.for_robot import work_for
+from qpsafe.sim.ranging.sets import range_sensors, sensor_kinds
 from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
@@ -48,8 +50,6 @@ LINE = Path(__file__).with_name("line.toml")
 RATES = (0.5, 2.0, 20.0)  # of that line, for robots that cannot follow it where it is [m/s, m/s², m/s³]
 #: Motions that have a name; any other is the path of a program's file.
 MOTIONS = ("hold", "line", "pick")
-#: How late sensors are: a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s].
-SENSOR_LATE = {"sharp": 0.055}
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Station:
         motion: One of `MOTIONS`, or the path of a program.
         robot: The robot, with spots.
         lag: Of its servos [s].
-        sensor: ``ideal``, ``sharp`` or ``perfect``.
+        sensor: As for `Plan`.
         furniture: A cell's TOML file, None for none.
     """
 
@@ -102,6 +102,11 @@ class Station:
         spots = load_spots(self.robot)
         assert spots is not None  # a station without them is refused
         return spots
+
+    @cached_property
+    def without_images(self) -> Station:
+        """The same for a controller that is told points: no sensor is waited for."""
+        return replace(self, sensor="ideal") if sensor_kinds(self.sensor).ranging else self
 
     @cached_property
     def packed(self) -> dict[str, Packed | None]:
@@ -183,7 +188,10 @@ class Station:
             parts: More arguments of `SafetyController`.
         """
         count = len(self.robot.tool_frames)
-        given: dict[str, Any] = {"known": self.known, "spots": self.spots}
+        kinds = sensor_kinds(self.sensor)
+        given: dict[str, Any] = {"known": self.known, "spots": "off" if kinds.spots is None else self.spots}
+        if kinds.ranging and "range_sensors" not in parts:
+            given["range_sensors"], _ = range_sensors(kinds.ranging, self.robot)
         thresholds = self.robot.with_parameters(parts.get("parameters", "robot"))
         given |= {"activation": robot_activation(thresholds, count, count)} | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
@@ -204,7 +212,7 @@ class Station:
 
     @cached_property
     def _loner(self) -> list[Any]:
-        return [self.controller(), self.start, np.zeros(self.robot.nq)]
+        return [self.controller(range_sensors=()), self.start, np.zeros(self.robot.nq)]
 
     def _go_on_alone(self) -> None:
         controller, q, qd = self._loner
@@ -216,7 +224,7 @@ class Station:
     def separation(self) -> Separation:
         """Figures of a monitor made for this station: the delays of servo and sensors are part of its reaction time."""
         late = self.lag + 2.0 / OMEGA if self.lag > 0.0 else 0.0
-        reaction = Separation.reaction_time + late + SENSOR_LATE.get(self.sensor, 0.0)
+        reaction = Separation.reaction_time + late + delay(self.sensor, self.robot)
         return Separation(self.deceleration, reaction_time=reaction)
 
     @cached_property
@@ -282,7 +290,7 @@ def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", ce
         robot: A bundled name or a path, as for `load_robot`.
         motion: One of `MOTIONS`, or the path of a program.
         lag: Of the servos [s].
-        sensor: ``ideal``, ``sharp`` or ``perfect``.
+        sensor: As for `Plan`.
         cell: A TOML file of furniture, None for none.
 
     Raises:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -29,9 +30,8 @@ def _found_by_name(name: str) -> candidates.Candidates:
     return _find(qpsafe.load_robot(name), spacing=0.1265)
 
 
-def _found(robot: Robot, wanted: int, **_: object) -> candidates.Candidates:
-    assert wanted == 40
-    return _found_by_name(robot.name)
+def _found(robot: Robot, wanted: int, **options: Any) -> candidates.Candidates:
+    return _found_by_name(robot.name) if wanted == 40 else _find(robot, wanted, **options)
 
 
 _find = candidates.candidate_nodes
