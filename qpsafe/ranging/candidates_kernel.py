@@ -12,7 +12,7 @@ from math import inf, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
-from qpsafe.ranging import prediction
+from qpsafe.ranging import nearest_kernel, prediction
 from qpsafe.ranging.nearest_kernel import to_link
 from qpsafe.ranging.prediction import person_speed
 from qpsafe.robot.kinematics import Index
