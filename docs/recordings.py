@@ -23,6 +23,8 @@ from qpsafe.sim.web.server import Page
 from qpsafe.sim.web.view import EYE, LOOK
 
 EVERY = 25  # ticks: ten pictures a second
+#: The frame on a page is smaller than the page of `qpsafe web`: nearer than there [m].
+NEAR = tuple(at + 0.7 * (eye - at) for eye, at in zip(EYE, LOOK, strict=True))
 
 
 def experiments() -> dict[str, Experiment]:
@@ -42,7 +44,7 @@ def recorded(experiment: Experiment) -> str:
     page = Page("127.0.0.1", 0, "an experiment")
     try:
         server = page.server
-        server.initial_camera.position, server.initial_camera.look_at = EYE, LOOK
+        server.initial_camera.position, server.initial_camera.look_at = NEAR, LOOK
         bodies = Bodies(server, experiment.scene)
         thresholds = medium_and_high(qpsafe.robot_activation(robot))
         danger = Danger(server, experiment.scene, load_spots(robot), bodies, thresholds)
