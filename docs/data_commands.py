@@ -39,6 +39,8 @@ COMMANDS = {
     "projection": "benchmarks/projection_residuals.py {out}",
     "walkers": "benchmarks/walkers_seen.py {out}",
     "stumbles": "benchmarks/stumbling_hands.py {out}",
+    "gym": "benchmarks/bench_gym.py {out}",
+    "plugin-ticks": "benchmarks/bench_plugins.py {out}",
     "other-robots": "benchmarks/other_robots.py {out}",
     "irc5-faults": "irc5-faults --moments 20 --jobs 1 --json",
     "hqp-solvers": "benchmarks/bench_hqp.py --out {out}",

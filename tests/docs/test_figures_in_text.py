@@ -79,11 +79,14 @@ def robots() -> list[str]:
     robot = qpsafe.load_robot("irb140")
     wire, tip, field = robot.wire(robot.home, np.zeros(6)), robot.pose("tcp", robot.home)[:3, 3], qpsafe.DangerField()
     near, far = (field.value(tip[None] + [[ahead, 0.0, 0.0]], wire)[0] for ahead in (0.34, 0.54))
+    wire.ends[-1] = robot.pose("flange", robot.home)[:3, 3]
+    bare, bare_far = (field.value(tip[None] + [[ahead, 0.0, 0.0]], wire)[0] for ahead in (0.34, 0.54))
     iiwa = qpsafe.robot_activation(qpsafe.load_robot("iiwa14")).thresholds
     yumi = qpsafe.robot_activation(qpsafe.load_robot("irb14000"), 1, 1).thresholds
     return [
         f"every tool is back within {returned}",
         f"has a field of {near:.2f} at 0.34 m and {far:.2f} at 0.54 m",
+        f"ending the wire at the flange gives {bare:.2f} and {bare_far:.2f}",
         f"| {iiwa[0].delta:.2f} | {iiwa[1].delta:.2f} |",
         f"| {yumi[0].delta:.2f} | {yumi[1].delta:.2f} |",
     ]
