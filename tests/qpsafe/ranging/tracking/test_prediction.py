@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.ranging import prediction
+from qpsafe.ranging.tracking import prediction
 from qpsafe.ranging.tracking.prediction import Foresight
 
 number = st.floats(-1.0, 1.0)
