@@ -27,6 +27,7 @@ COMMANDS = {
     "place": "place --no-caps --json --no-pictures --out {out}",
     "place-share": "place --no-caps --probability 0.89 --json --no-pictures --out {out}",
     "place-caps": "place --no-exact --json --no-pictures --out {out}",
+    "place-arrays": "place --sensor vl53l5cx --objective nearest --no-exact --json --no-pictures --out {out}",
     "ticks": "bench --json",
     "irc5-faults": "irc5-faults --moments 20 --jobs 1 --json",
     "camera-calibration": "benchmarks/camera_calibration.py --out {out}",

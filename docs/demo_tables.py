@@ -140,6 +140,31 @@ def place() -> str:
     return lines(("20 spots by", "detected", "95 %", "danger measured"), [*rows, ("the paper", "89 %", "", "")])
 
 
+def share(probability: float, low: float, high: float) -> str:
+    """A share and its limits in per cent."""
+    return f"{100 * probability:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def place_arrays() -> str:
+    """Spots and arrays as they are bundled, and fewer arrays, by detection and by the nearest part."""
+    judged = {name: measured(f"place-{name}") for name in ("caps", "arrays")}
+    keys = (("probability", "low", "high"), ("nearest", "nearest_low", "nearest_high"))
+
+    def bundled(what: str, found: dict[str, Any]) -> tuple[str, ...]:
+        own = found["placements"][found["wanted"]]["independent_sample"]
+        return what, *(share(*(own[key] for key in three)) for three in keys), f"{100 * own['danger']:.0f} %"
+
+    rows = [bundled("20 Sharps, as bundled", judged["caps"])]
+    for objective, counts in (("detection", (8, 12, 20)), ("nearest", (8, 12))):
+        curve = judged["arrays"]["curves"][objective]
+        for k in counts:
+            seen = share(curve["probability"][1][k], *(side[k] for side in curve["confidence"]))
+            near = share(curve["nearest"][1][k], *(side[k] for side in curve["nearest_confidence"]))
+            rows.append((f"{k} arrays by `{objective}`", seen, near, f"{100 * curve['danger'][1][k]:.0f} %"))
+    rows.append(bundled("20 arrays by `nearest`, as bundled", judged["arrays"]))
+    return lines(("sensors", "detected", "nearest part seen", "danger measured"), rows)
+
+
 def bench() -> str:
     """What a tick takes, and of mink's."""
     tick = "whole tick, 20 distances"
@@ -219,3 +244,4 @@ def camera_calibration() -> str:
 
 TABLES = {"path": path, "fast-person": fast_person, "pick": pick, "compare": compare, "place": place, "bench": bench}
 TABLES |= {"hqp-random": hqp_random, "hqp-drift": hqp_drift, "late": late, "camera-calibration": camera_calibration}
+TABLES |= {"place-arrays": place_arrays}

@@ -1,12 +1,23 @@
-"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as it is shipped, and its pictures."""
+"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as shipped, its pictures, and arrays beside spots.
 
+The last is drawn from docs/data/place.json and place-arrays.json.
+"""
+
+import json
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-IMG = Path(__file__).parent / "img"
+import matplotlib
+import numpy as np
+
+from qpsafe.sim.drawing.plots import STYLE
+from qpsafe.text.figure_file import save
+
+DOCS = Path(__file__).parent
+IMG = DOCS / "img"
 FIGURES = {"figure-9.png": "placement-figure-9", "nodes.png": "placement-nodes", "spots.png": "placement-spots"}
 
 
@@ -17,6 +28,42 @@ def main() -> None:
         subprocess.run([sys.executable, "-c", code, "place", "--no-exact", "--out", folder], check=True)
         for name, target in FIGURES.items():
             shutil.copy(Path(folder) / name, IMG / f"{target}.png")
+    arrays_beside_spots()
+
+
+MOST = 60  # sensors that are shown
+LOOKS = {
+    ("place", "detection"): ("Sharp, by detection", "#555555", "-"),
+    ("place", "nearest"): ("Sharp, by nearest", "#555555", "--"),
+    ("place-arrays", "detection"): ("arrays, by detection", "#0b5fa5", "-"),
+    ("place-arrays", "nearest"): ("arrays, by nearest", "#0b5fa5", "--"),
+}
+
+
+def arrays_beside_spots() -> None:
+    """Who is detected, of whom the nearest part is seen, and what of the danger, by how many sensors of either kind."""
+    import matplotlib.pyplot as plt
+
+    panels = (("detected", "probability", "confidence"), ("nearest part seen", "nearest", "nearest_confidence"))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = plt.subplots(1, 3, figsize=(10.0, 3.6), sharey=True, layout="constrained")
+        for (name, objective), (label, colour, style) in LOOKS.items():
+            text = (DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")
+            curve = json.loads(text)["curves"][objective]
+            k = np.arange(MOST + 1)
+            for axis, (_, share, limits) in zip(axes, panels, strict=False):
+                low, high = np.array(curve[limits])[:, : MOST + 1]
+                axis.fill_between(k, low, high, color=colour, alpha=0.2, linewidth=0)
+                axis.plot(k, curve[share][1][: MOST + 1], style, color=colour, label=label)
+            axes[2].plot(k, curve["danger"][1][: MOST + 1], style, color=colour, label=label)
+        for axis, title in zip(axes, (*(panel[0] for panel in panels), "danger measured, of max SDF"), strict=True):
+            axis.set_title(title)
+            axis.set_xlabel("number of sensors")
+            axis.set_xlim(0, MOST)
+            axis.set_ylim(0.0, 1.02)
+        axes[0].legend(loc="lower right", fontsize=8)
+        save(figure, IMG / "placement-arrays.png")
+        plt.close(figure)
 
 
 if __name__ == "__main__":

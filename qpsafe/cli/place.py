@@ -14,7 +14,7 @@ import typer
 from qpsafe.cli.common import console, print_json, progress_bar, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.errors import ConfigurationError
-from qpsafe.placement.objective import Objective, check_request
+from qpsafe.placement.objective import Objective, SensorName, check_request
 from qpsafe.text.json_text import json_text
 from qpsafe.text.words import counted
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 def place(
     context: typer.Context,
     robot: Annotated[str, typer.Argument(help="A bundled robot, or the path of a robot folder.")] = "irb140",
+    sensor: Annotated[SensorName, typer.Option(help="What is placed.")] = SensorName.sharp,
     spots: Annotated[
         int | None, typer.Option(help="Number of spots; by default 20, or as many as the regions hold.")
     ] = None,
@@ -38,7 +39,11 @@ def place(
         typer.Option(help="Find the fewest spots that reach this detection probability instead, eq. (13)."),
     ] = None,
     objective: Annotated[
-        Objective, typer.Option(help="cost is (10)-(12); the others give nothing for redundant spots.")
+        Objective,
+        typer.Option(
+            help="cost is (10)-(12); the others give nothing for redundant spots. nearest: detected close to the "
+            "person's nearest point; with --probability too."
+        ),
     ] = Objective.detection,
     caps: Annotated[
         bool, typer.Option(help="Respect at_most of the regions (not in the curves, nor for (13)).")
@@ -73,8 +78,10 @@ def place(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.placement.candidates import candidate_nodes
     from qpsafe.placement.knapsack import check_spots
+    from qpsafe.placement.sensors import SENSORS
     from qpsafe.placement.spots_toml import spots_toml
     from qpsafe.placement.study import study, to_dict
+    from qpsafe.ranging.sensor_file import PATTERN
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.placement.figures import figure_9
     from qpsafe.sim.placement.run import MonteCarlo
@@ -89,7 +96,7 @@ def place(
                 task, completed=grids, description=f"{counted(nodes, 'candidate node')}: {last} in this grid"
             )
 
-        found = candidate_nodes(machine, nodes, progress=tried)
+        found = candidate_nodes(machine, nodes, sensor=SENSORS[sensor], progress=tried)
     check_request(len(found), spots, probability)
     limits = found.caps(machine) if caps else None
     count = spots or min(20, len(found) if limits is None else limits.room())
@@ -129,12 +136,13 @@ def place(
         _draw(machine, found, chosen, out, screen)
     write_text(out / "report.json", json_text(report) + "\n")
     remark = _remark(machine.title, result, _command(context), pairs)
-    write_text(out / "spots.toml", spots_toml(found, chosen.tolist(), remark))
+    file = PATTERN.format(sensor.value) if found.sensor.is_array else "spots.toml"
+    write_text(out / file, spots_toml(found, chosen.tolist(), remark))
     if json:
         print_json(report)
     else:
         show(result, screen)
-        screen.print(f"written to {out}: spots.toml, report.json, figure-9.png")
+        screen.print(f"written to {out}: {file}, report.json, figure-9.png")
 
 
 def _completed(progress: Progress, task: TaskID, done: int) -> None:
@@ -197,13 +205,21 @@ def _remark(title: str, result: Study, command: str, pairs: int) -> str:
     """What stands at the head of the file."""
     answer, found = result.answer, result.candidates
     goal = "fewest spots for a probability, eq. (13)" if answer.objective == "probability" else answer.objective
+    array = found.sensor.is_array
+    acts = (
+        "What an array sees acts on the link nearest to it; link counts wire links from 1 and says which carries it."
+        if array
+        else "link counts wire links from 1: the spot's danger vector acts there, eq. (8)."
+    )
+    fair, thing = answer.fair, "array" if array else "spot"
     return (
-        f"{counted(len(answer.solution.chosen), 'spot')} on the {title}, made by `{command}`: chosen out of "
+        f"{counted(len(answer.solution.chosen), thing)} on the {title}, made by `{command}`: chosen out of "
         f"{counted(len(found), 'node')} {1e3 * found.spacing:.0f} mm apart for the objective: {goal} "
         f"({counted(pairs, 'pair')}, {answer.solution.method}, gap {100 * answer.solution.gap:.1f} %). They detect "
-        f"{100 * answer.fair.probability:.1f} % of an independent sample (95 %: {100 * answer.fair.low:.1f} to "
-        f"{100 * answer.fair.high:.1f}). position [m] and direction (unit) are given in the frame of the link that "
-        "carries the spot, eq. (7); link counts wire links from 1: the spot's danger vector acts there, eq. (8)."
+        f"{100 * fair.probability:.1f} % of an independent sample (95 %: {100 * fair.low:.1f} to "
+        f"{100 * fair.high:.1f}), and of {100 * fair.nearest:.1f} % ({100 * fair.nearest_low:.1f} to "
+        f"{100 * fair.nearest_high:.1f}) the part that is nearest to the robot. position [m] and direction (unit) are "
+        f"given in the frame of the link that carries the {thing}, eq. (7). {acts}"
     )
 
 
@@ -212,8 +228,8 @@ def show(result: Study, screen: Console) -> None:
     from qpsafe.cli.sheet import Sheet
 
     pairs = result.samples[1].pairs
-    headings = ("objective", "spots", "detected", "95 %", "optimised", "danger", "method", "gap")
-    sheet = Sheet(f"Judged on {counted(pairs, 'independent pair')}, but for `optimised`", headings, text=(0, 6))
+    headings = ("objective", "spots", "detected", "95 %", "optimised", "nearest", "danger", "method", "gap")
+    sheet = Sheet(f"Judged on {counted(pairs, 'independent pair')}, but for `optimised`", headings, text=(0, 7))
     for name, item in result.placements.items():
         fair, solution = item.fair, item.solution
         sheet.add_row(
@@ -222,6 +238,7 @@ def show(result: Study, screen: Console) -> None:
             f"{100 * fair.probability:.1f} %",
             f"{100 * fair.low:.1f}-{100 * fair.high:.1f}",
             f"{100 * item.flattered.probability:.1f} %",
+            f"{100 * fair.nearest:.1f} %",
             f"{100 * fair.danger:.1f} %",
             solution.method,
             f"{100 * solution.gap:.1f} %",

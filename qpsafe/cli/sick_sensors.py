@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import SensorName, console, progress_bar, show_matrix, verdict
+from qpsafe.cli.common import console, progress_bar, show_matrix, verdict
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -21,7 +21,13 @@ def sick_sensors(
         int, typer.Option(min=1, max=200, help="Number of random moments in the first experiment.")
     ] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the moments and of the spots that fall sick.")] = 0,
-    sensor: Annotated[SensorName, typer.Option(help="Sensor model of the healthy spots.")] = SensorName.ideal,
+    sensor: Annotated[
+        str,
+        typer.Option(
+            help="The healthy sensors: ideal or sharp spots, or vl53l5cx, sharp+depth and so on, as in `qpsafe demo "
+            "fixed`, whose images are spoilt then."
+        ),
+    ] = "ideal",
     jobs: Annotated[
         int, typer.Option(min=1, help="Number of processes; by default one per processor.")
     ] = os.cpu_count() or 1,
@@ -29,8 +35,8 @@ def sick_sensors(
 ) -> None:
     """Inject NaN, spikes, stuck, stale, dead sensors in the first experiment and print the matrix of reactions.
 
-    Exit code 1 if a reaction listed in docs/reference/sensing.md is missing or late, a limit is exceeded, or the robot
-    touches something that it would not have touched with healthy sensors.
+    Exit code 1 if a reaction listed in docs/reference (sensing.md, vl53l5cx.md) is missing or late, a limit is
+    exceeded, or the robot touches something that it would not have touched with healthy sensors.
     """
     screen = console(json)
     from qpsafe.robot.loader import load_robot
@@ -40,7 +46,7 @@ def sick_sensors(
     with progress_bar(screen) as progress:
         task = progress.add_task(counted(moments, "moment"), total=None)
         results = run_matrix(
-            FixedExperiment(load_robot("irb140"), sensor=sensor.value),
+            FixedExperiment(load_robot("irb140"), sensor=sensor),
             moments,
             seed,
             jobs=jobs,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,10 @@ from numpy.typing import NDArray
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.placement.coverage import Caps
 from qpsafe.placement.grid import NEAREST, lattice, looks_out, thin_out
-from qpsafe.placement.sight import SelfSight
+from qpsafe.placement.sensors import Sensor
+from qpsafe.placement.sight import SelfSight, zone_rays
 from qpsafe.placement.surface import Surface, link_surface
-from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spot import Spot
+from qpsafe.sensing.spot import Spot, axes_along
 from qpsafe.sensing.spots import SpotArray
 
 if TYPE_CHECKING:
@@ -29,23 +30,9 @@ Array = NDArray[np.float64]
 #: How many candidates the paper has on its IRB 140.
 SOURCE_NODES = 254
 COARSE = 0.015  # lattice that measures a region [m]
+BLIND = 0.25  # largest share of an array's zones that may see nothing but the link that carries it
 FINE = 5.0  # the lattice that fills gaps is finer than the grid by this
 _PASSES, _ROUNDS = 6, 8  # of the search for the spacing of a wanted number
-
-
-class Sensor(NamedTuple):
-    """What is to be placed.
-
-    Attributes:
-        name: For the file.
-        range_min, range_max: A detection counts between these distances [m].
-        field_of_view: Full opening angle [rad]; for the file only, the placement looks along the axis.
-    """
-
-    name: str = "Sharp GP2Y0A02YK"
-    range_min: float = 0.20
-    range_max: float = 0.80
-    field_of_view: float = float(np.deg2rad(6.0))
 
 
 @dataclass(frozen=True)
@@ -57,19 +44,27 @@ class Candidates:
         spacing: Of the grid [m].
         sensor: What is to be placed.
         region: Of each node, its place among the robot's regions, (n_nodes,).
+        free: Which zones of a sensor there see more than the link that carries it, (n_nodes, z).
     """
 
     nodes: SpotArray
     spacing: float
     sensor: Sensor
     region: NDArray[np.int64]
+    free: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.nodes)
 
+    @property
+    def links(self) -> NDArray[np.int64]:
+        """What the danger that each node sees is counted by, (n_nodes,): its link, or all as one for arrays."""
+        return np.zeros_like(self.nodes.links) if self.sensor.is_array else self.nodes.links
+
     def caps(self, robot: Robot) -> Caps:
-        """How many spots the robot's regions take."""
-        most = [len(self) if region.at_most is None else region.at_most for region in robot.regions]
+        """How many spots the robot's regions take; of arrays as many as one likes, but none where `at_most` is 0."""
+        free = (None, *range(1, len(self) + 1)) if self.sensor.is_array else (None,)
+        most = [len(self) if region.at_most in free else region.at_most for region in robot.regions]
         return Caps(self.region, np.array(most, dtype=np.int64))
 
 
@@ -95,14 +90,14 @@ def candidate_nodes(
         ConfigurationError: `wanted` is below 1, or the spacing or the sensor's range make no sense.
     """
     sensor = Sensor() if sensor is None else sensor
-    if not (0.0 < sensor.range_min < sensor.range_max < np.inf):
-        found = f"{sensor.range_min}..{sensor.range_max}"
-        raise ConfigurationError("candidate_nodes", "sensor", found, "0 < range_min < range_max, finite [m]")
+    sensor.check()
     if not robot.regions:
         raise RobotFileError(robot.folder / "robot.toml", "regions", None, "at least one [[regions]] to put sensors on")
     if not (isinstance(wanted, int) and wanted >= 1):
         raise ConfigurationError("candidate_nodes", "wanted", wanted, "a number of nodes >= 1")
-    sight = SelfSight(robot, SensingRules().d_min, sensor.range_max, sensor.field_of_view)
+    # an array has other zones for what the robot hides: only what counts whatever it is matters
+    reach = sensor.always if sensor.is_array else sensor.range_max
+    sight = SelfSight(robot, sensor.always, reach, sensor.opening, sensor.directions if sensor.is_array else None)
     patches = [_Patch(robot, region, sensor, sight) for region in robot.regions]
     if spacing is None:
         # the area that looks out, by a coarse lattice, says what to expect
@@ -115,27 +110,41 @@ def candidate_nodes(
         raise ConfigurationError("candidate_nodes", "spacing", spacing, "0.001 to 1 m")
     spots: list[Spot] = []
     region: list[int] = []
+    free = []
     for i, patch in enumerate(patches):
-        spots += patch.spots(robot, spacing, sensor)
-        region += [i] * (len(spots) - len(region))
-    return Candidates(SpotArray.of(spots), spacing, sensor, np.array(region, dtype=np.int64))
+        points, normals = patch.grid(spacing)
+        if not len(points) and not patch.coarse:
+            continue
+        spots += patch.spots(robot, points, normals)
+        free.append(patch.free(points, normals))
+        region += [i] * len(points)
+    return Candidates(SpotArray.of(spots), spacing, sensor, np.array(region, dtype=np.int64), np.concatenate(free))
 
 
 class _Patch:
     """One region: its part of the surface, and a fine lattice on it."""
 
     def __init__(self, robot: Robot, region: Region, sensor: Sensor, sight: SelfSight) -> None:
-        self.region, self.reach, self.sight = region, sensor.range_max, sight
+        self.region, self.sensor, self.sight, self.file = region, sensor, sight, robot.folder / "robot.toml"
         surface = link_surface(robot, region)
         self.box = np.stack((region.lower, region.upper))
         near = (surface.skin.max(axis=1) >= region.lower) & (surface.skin.min(axis=1) <= region.upper)
         self.surface = Surface(surface.skin[near.all(axis=1)], surface.body)
         self.normals = self.surface.normals()
-        self.coarse = len(self.usable_lattice(COARSE)[0])
-        if self.coarse == 0:
+
+    @cached_property
+    def coarse(self) -> int:
+        """How many points of a coarse lattice can be used.
+
+        Raises:
+            RobotFileError: None, though some are wanted.
+        """
+        count = len(self.usable_lattice(COARSE)[0])
+        if count == 0 and self.region.at_most != 0:
             expected = "a box with some surface of the link in it that does not look at the link itself"
-            where = f"regions ({region.name}).lower"
-            raise RobotFileError(robot.folder / "robot.toml", where, region.lower.tolist(), expected)
+            where = f"regions ({self.region.name}).lower"
+            raise RobotFileError(self.file, where, self.region.lower.tolist(), expected)
+        return count
 
     def lattice(self, spacing: float) -> tuple[Array, Array]:
         """Lattice points in the box, and their normals, (k, 3) each."""
@@ -145,10 +154,20 @@ class _Patch:
 
     def usable(self, points: Array, normals: Array) -> NDArray[np.bool_]:
         """Which points look out and see no other part of the robot, (k,)."""
-        usable = looks_out(points, normals, self.surface.body, self.reach)
+        usable = looks_out(points, normals, self.surface.body, self.sensor.range_max)
         at = self.region
         usable[usable] = self.sight.clear(at.frame, points[usable], normals[usable], at.self_sight)
+        usable[usable] = (~self.free(points[usable], normals[usable])).mean(axis=1) <= BLIND
         return usable
+
+    def free(self, points: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which zones of sensors at points do not look at the body that carries them, (k, z)."""
+        if not self.sensor.is_array:
+            return np.ones((len(points), 1), dtype=np.bool_)  # along the normal, see `usable`
+        rays = zone_rays(normals, self.sensor.directions)
+        starts = np.repeat(points, rays.shape[1], axis=0)
+        out = looks_out(starts, rays.reshape(-1, 3), self.surface.body, self.sensor.range_max)
+        return out.reshape(rays.shape[:2])
 
     def usable_lattice(self, spacing: float) -> tuple[Array, Array]:
         """Lattice points that can be used, and their normals, (k, 3) each."""
@@ -175,27 +194,23 @@ class _Patch:
         kept = thin_out(points, normals, NEAREST * spacing)
         return points[kept], normals[kept]
 
-    def spots(self, robot: Robot, spacing: float, sensor: Sensor) -> list[Spot]:
-        points, normals = self.grid(spacing)
+    def spots(self, robot: Robot, points: Array, normals: Array) -> list[Spot]:
         poses = np.array([node_pose(p, n) for p, n in zip(points, normals, strict=True)])
-        region = self.region
+        region, sensor = self.region, self.sensor
         sides = _sides(robot.pose(region.frame, robot.home)[:3, :3] @ normals.T)
         count: Counter[str] = Counter()
         spots = []
         for pose, side in zip(poses, sides, strict=True):
             count[side] += 1
             name = f"{region.name} {side} {count[side]}"
-            spots.append(Spot(name, region.link, region.frame, pose, *sensor[1:]))
+            spots.append(Spot(name, region.link, region.frame, pose, *sensor[1:4]))
         return spots
 
 
 def node_pose(point: Array, normal: Array) -> Array:
     """The constant matrix of eq. (7), (4, 4): origin in the node, z axis along the outward normal."""
-    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
-    x /= np.linalg.norm(x)
     pose = np.eye(4)
-    pose[:3, :3] = np.stack((x, np.cross(normal, x), normal), axis=1)
-    pose[:3, 3] = point
+    pose[:3, :3], pose[:3, 3] = axes_along(normal), point
     return pose
 
 

@@ -4,10 +4,12 @@ What chosen nodes S are worth is a sum over cases of the best that any of them c
 
     f(S) = sum over cases of  max over i in S of v_i,      v_i = 0 where node i detects nothing.
 
-A case is a pair, and v_i = 1: f is the number of detected pairs, (13). Or a case is a pair seen from one link, and
+A case is a pair, and v_i = 1: f is the number of detected pairs, (13), or of those of which the point nearest to the
+robot is seen. Or a case is a pair seen from one link, and
 v_i = Q_i of eq. (9) or the size of the torque (14), (15) that it makes. Of two nodes of a link that see the same
 person only the better one counts: redundant nodes do not pay, as they do in (11). Links count one by one since each
-evades by a danger vector of its own, eq. (8).
+evades by a danger vector of its own, eq. (8). What an array sees acts on the link nearest to it, whichever carries the
+array: there all nodes count as of one link.
 """
 
 from __future__ import annotations

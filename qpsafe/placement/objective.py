@@ -12,8 +12,16 @@ class Objective(StrEnum):
 
     cost = "cost"  # (10) to (12)
     detection = "detection"  # the probability that any spot detects: (13) the other way round
+    nearest = "nearest"  # the probability that a point close to the person's nearest one is detected
     danger = "danger"  # the danger that each link sees; what another node of the link sees already does not pay
     evasion = "evasion"  # the same, by the torque (14), (15) it makes instead of the danger
+
+
+class SensorName(StrEnum):
+    """What can be placed, see `qpsafe.placement.sensors`."""
+
+    sharp = "sharp"  # a spot, which looks along one axis
+    vl53l5cx = "vl53l5cx"  # an array of 8 x 8 zones
 
 
 def check_request(nodes: int, spots: int | None, probability: float | None) -> None:

@@ -1,9 +1,9 @@
-"""What a Monte Carlo sample leaves behind: all that eqs. (9) to (13) need, 20 bytes a detection and 16 a pair."""
+"""What a Monte Carlo sample leaves behind: all that eqs. (9) to (13) need, 21 bytes a detection and 16 a pair."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from qpsafe.compiled.compiled import Array, entry, readable
 from qpsafe.errors import ConfigurationError
+
+#: A detected point this near to a person's nearest one tells where that is: less than a hand is long [m].
+NEAR = 0.10
 
 
 class Detections(NamedTuple):
@@ -23,7 +26,8 @@ class Detections(NamedTuple):
         danger: Static danger field at each detected point, (d,) [1/m].
         torque: Size of the virtual joint torque that each detection makes by eqs. (14), (15), (d,).
         peak: Largest static danger field on each dummy, (k,) [1/m].
-        on_robot: Rays that met the robot within range before anything else.
+        near: Whether a detected point is within `NEAR` of the dummy's point that is nearest to the robot, (d,).
+        on_robot: Spots' rays that met the robot within range before anything else.
         too_near: Rays that met the dummy nearer than the sensor's range.
     """
 
@@ -32,6 +36,7 @@ class Detections(NamedTuple):
     danger: Array
     torque: Array
     peak: Array
+    near: NDArray[np.bool_]
     on_robot: int = 0
     too_near: int = 0
 
@@ -47,7 +52,8 @@ class Sample:
         danger: Static danger field at each detected point, Q of eq. (9), (d,) [1/m].
         torque: Size of the virtual joint torque that each detection makes by eqs. (14), (15), (d,).
         peak: Largest static danger field on each dummy, max SDF of eq. (12), (P,) [1/m].
-        on_robot: Rays that met the robot within range before anything else.
+        near: Whether a detected point is within `NEAR` of the dummy's point that is nearest to the robot, (d,).
+        on_robot: Spots' rays that met the robot within range before anything else.
         too_near: Rays that met the dummy nearer than the sensor's range.
     """
 
@@ -57,6 +63,7 @@ class Sample:
     danger: Array
     torque: Array
     peak: Array
+    near: NDArray[np.bool_]
     on_robot: int = 0
     too_near: int = 0
 
@@ -69,6 +76,12 @@ class Sample:
     def pair(self) -> NDArray[np.int32]:
         """Pair of each detection, (d,)."""
         return np.repeat(np.arange(self.pairs, dtype=np.int32), np.diff(self.first))
+
+    def nearest(self) -> Sample:
+        """The same sample, in which only detections count that are `near`."""
+        kept = np.concatenate(([0], np.cumsum(self.near)))
+        arrays = {key: getattr(self, key)[self.near] for key in ("node", "danger", "torque", "near")}
+        return replace(self, first=kept[self.first], **arrays)
 
     def sums(self) -> Array:
         """Sum over pairs of each node's Q, (n,) [1/m]."""
@@ -92,7 +105,7 @@ class Sample:
     @classmethod
     def collect(cls, nodes: int, parts: Iterable[Detections]) -> Sample:
         """Put consecutive parts together."""
-        counts, node, danger, torque, peak = [], [], [], [], []
+        counts, node, danger, torque, peak, near = [], [], [], [], [], []
         on_robot = too_near = 0
         for part in parts:
             counts.append(part.counts)
@@ -100,6 +113,7 @@ class Sample:
             danger.append(part.danger)
             torque.append(part.torque)
             peak.append(part.peak)
+            near.append(part.near)
             on_robot, too_near = on_robot + part.on_robot, too_near + part.too_near
         if not counts:
             raise ConfigurationError("Sample", "pairs", 0, "at least one")
@@ -111,6 +125,7 @@ class Sample:
             np.concatenate(danger),
             np.concatenate(torque),
             np.concatenate(peak),
+            np.concatenate(near),
             on_robot,
             too_near,
         )

@@ -23,6 +23,7 @@ from qpsafe.placement.surface import model_body
 from qpsafe.robot.hulls import solid_geoms
 from qpsafe.robot.mjcf import held_positions
 from qpsafe.robot.mujoco_spec import mujoco_model
+from qpsafe.sensing.spot import axes_along
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -56,17 +57,19 @@ class SelfSight:
         nearest: Nearer than this and a margin the robot must not see itself anywhere [m].
         reach: Nearer than this it must not do so around home [m].
         opening: Full angle of a sensor's cone [rad].
+        zones: Where it looks in there, in its own frame, (z, 3); by default along the axis and the cone's rim.
 
     Raises:
         RobotFileError: MuJoCo cannot read the robot's model.
     """
 
-    def __init__(self, robot: Robot, nearest: float, reach: float, opening: float) -> None:
+    def __init__(self, robot: Robot, nearest: float, reach: float, opening: float, zones: Array | None = None) -> None:
         require("place", "a choice of sensors", "mujoco")
         import mujoco
         import mujoco.batch
 
         self.robot, self.opening = robot, opening
+        self.zones = _rim(opening) if zones is None else zones
         self.nearest, self.reach = nearest + MARGIN, max(reach, nearest + MARGIN)
         self._frames: dict[str, Array] = {}
         self._model: Any = mujoco_model(robot)
@@ -79,7 +82,7 @@ class SelfSight:
         self._held = held_positions(self._model, robot.held)
         self._poses, self.around_home = self._free()
         self.configurations = np.array([pose.q for pose in self._poses])
-        self._batch = mujoco.batch.Batch(self._model, len(self._poses))
+        self._batch = mujoco.batch.Batch(self._model, len(self._poses), nthread=1)  # rays are cast pose by pose
         self._batch.bind("qpos")[:, self._held[0]] = self._held[1]
         self._batch.bind("qpos")[:, self._q] = self.configurations
 
@@ -131,7 +134,7 @@ class SelfSight:
         boxes = model.geom_aabb[others].copy()
         boxes[model.geom_rbound[others] == 0.0, 3:] = np.inf  # a plane
         seen = np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
-        cone = _cone(directions, self.opening)  # (k, rays, 3)
+        cone = zone_rays(directions, self.zones)  # (k, rays, 3)
         left, times = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
         allowed = most * (len(self._poses) - self.around_home)
         for i, (pose, T) in enumerate(zip(self._poses, self._frames[frame], strict=True)):
@@ -145,10 +148,11 @@ class SelfSight:
             if not len(some):
                 continue
             rays = (cone[some] @ T[:3, :3].T).reshape(-1, 3)
-            origins = np.repeat(places[near], RIM + 1, axis=0)
-            distance, _ = self._batch.ray(origins, rays, geomgroup=seen, bodyexclude=own, ids=[i])
-            meets = ((distance >= 0.0) & (distance < reach)).reshape(-1, RIM + 1).any(axis=1)
-            times[some[meets]] += 1
+            origins = np.repeat(places[near], len(self.zones), axis=0)
+            meets = may_meet(origins, rays, pose.centres[others], pose.axes[others], boxes, reach, 0.0)
+            distance, _ = self._batch.ray(origins[meets], rays[meets], geomgroup=seen, bodyexclude=own, ids=[i])
+            meets[meets] = ((distance >= 0.0) & (distance < reach)).ravel()
+            times[some[meets.reshape(len(some), -1).any(axis=1)]] += 1
             left = left[times[left] <= most]
             if not len(left):
                 break
@@ -157,11 +161,13 @@ class SelfSight:
         return clear
 
 
-def _cone(directions: Array, opening: float) -> Array:
-    """Each direction and some on the rim of its cone, (k, 1 + RIM, 3)."""
-    aside = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    up, angle = np.cross(directions, aside), 2.0 * np.pi * np.arange(RIM) / RIM
-    rim = np.cos(angle)[:, None] * aside[:, None] + np.sin(angle)[:, None] * up[:, None]
-    rim = np.cos(0.5 * opening) * directions[:, None] + np.sin(0.5 * opening) * rim
-    return np.concatenate((directions[:, None], rim), axis=1)
+def zone_rays(directions: Array, zones: Array) -> Array:
+    """Where the zones (z, 3) of sensors look that look along directions (k, 3), turned as a file's are, (k, z, 3)."""
+    return np.asarray(np.einsum("kij,zj->kzi", axes_along(directions), zones))
+
+
+def _rim(opening: float) -> Array:
+    """The axis of a cone and some directions on its rim, (1 + RIM, 3)."""
+    angle, half = 2.0 * np.pi * np.arange(RIM) / RIM, 0.5 * opening
+    rim = np.stack((np.sin(half) * np.cos(angle), np.sin(half) * np.sin(angle), np.full(RIM, np.cos(half))), axis=1)
+    return np.concatenate((np.array([[0.0, 0.0, 1.0]]), rim))

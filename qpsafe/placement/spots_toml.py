@@ -1,4 +1,4 @@
-"""Writing a placement as the `spots.toml` that the controller loads."""
+"""Writing a placement as the `spots.toml`, or the file of arrays, that the controller loads."""
 
 from __future__ import annotations
 
@@ -29,8 +29,17 @@ def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> st
         f"sensor = {json_text(sensor.name)}",
         f"range_min = {sensor.range_min!r}    # [m]",
         f"range_max = {sensor.range_max!r}    # [m]",
-        f"field_of_view = {round(float(np.rad2deg(sensor.field_of_view)), 9)!r} # [deg] full angle of the cone it sees",
     ]
+    angle = repr(round(float(np.rad2deg(sensor.field_of_view)), 9))
+    if sensor.is_array:
+        lines += [
+            f"field_of_view = {angle} # [deg] from edge to edge",
+            f"zones = {list(sensor.zones)} # rows, columns",
+            f"rate = {sensor.rate!r} # [Hz]",
+            f"sigma = {sensor.sigma!r} # [m] of a reading",
+        ]
+    else:
+        lines.append(f"field_of_view = {angle} # [deg] full angle of the cone it sees")
     for i in sorted(int(i) for i in chosen):
         lines += [
             "",

@@ -1,6 +1,6 @@
 """What is known between two images, compiled: points are kept, moved, forgotten, and chosen from.
 
-A point of a sensor's last image counts where it was seen, or where its velocity has taken it if that is nearer. A
+A point of a sensor's last image counts where it was seen; what its velocity does is in `qpsafe.ranging.prediction`. A
 point that the next image does not show is lost: it still counts for a while, and meanwhile comes nearer at the walking
 speed of ISO 13855, as with spots.
 """
@@ -12,15 +12,16 @@ from math import inf, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
-from qpsafe.ranging import reduce_kernel
-from qpsafe.ranging.reduce_kernel import to_link
+from qpsafe.ranging import nearest_kernel, prediction
+from qpsafe.ranging.nearest_kernel import to_link
+from qpsafe.ranging.prediction import person_speed
 from qpsafe.robot.kinematics import Index
 
 #: Columns of a kept point: place, velocity, how wrong the place may be, when it was seen, when it was lost (inf: not).
 PLACE, VELOCITY, WRONG, STAMP, LOST = 0, 3, 6, 7, 8
 WIDTH = 9
 #: Numbers of `place_all`.
-NOW, HOLD, APPROACH, NEAREST, PERSON, AHEAD = range(6)
+NOW, HOLD, APPROACH, NEAREST, PERSON, AHEAD, ACCELERATION, FASTEST = range(8)
 
 _any, _two = readable(1), readable(2)
 _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1]
@@ -67,13 +68,28 @@ def renew(
 
 @entry(
     types.int64(
-        types.float64[:, :, ::1], _whole, _whole, _any, _any, _two, _two, _outs, _whole, _outs, _whole, _outs, _out
+        types.float64[:, :, ::1],
+        _whole,
+        _whole,
+        _any,
+        _any,
+        _two,
+        _two,
+        _outs,
+        _whole,
+        _outs,
+        _whole,
+        _outs,
+        _out,
+        _out,
     ),
-    reduce_kernel,
+    nearest_kernel,
+    prediction,
+    *prediction.USES,
 )
 def place_all(
     store: Array, counts: Index, carriers: Index, patience: Array, numbers: Array, starts: Array, ends: Array,
-    points: Array, links: Index, velocities: Array, sensors: Index, seen: Array, leads: Array,
+    points: Array, links: Index, velocities: Array, sensors: Index, seen: Array, ages: Array, leads: Array,
 ) -> int:  # fmt: skip
     """Where all kept points count now; those that are too old are forgotten.
 
@@ -83,12 +99,13 @@ def place_all(
         carriers: The link that a sensor's points act on (s,); -1: the nearest.
         patience: How old a point of the last image may be before it counts as lost (s,) [s].
         numbers: Present time, hold time [s], speed of lost points [m/s], how near to the wire they come [m], how fast
-            people come [m/s], how far the gate looks ahead [s].
+            people come [m/s], how far the gate looks ahead [s], how fast people become faster [m/s²], how fast they
+            become at most [m/s].
         starts, ends: Of the robot's wire (links, 3).
-        points, links, velocities, sensors: Filled: where a point counts (s r, 3), its link, the part of its velocity
-            towards that link (s r, 3), its sensor (s r,).
-        seen, leads: Filled: where it was seen (s r, 3), and for how long before now somebody as fast as `PERSON`
-            would have had to come from there to be as far as this one may be (s r,) [s].
+        points, links, velocities, sensors: Filled: where a point counts at rest (s r, 3), its link, its velocity when
+            it was seen (s r, 3), its sensor (s r,).
+        seen, ages, leads: Filled: where it was seen (s r, 3), how long ago, and for how long before now somebody as
+            fast as `PERSON` would have had to come from there to be as far as this one may be (s r,) [s].
 
     Returns:
         How many points count.
@@ -103,33 +120,31 @@ def place_all(
             for c in range(WIDTH):
                 store[s, left, c] = store[s, i, c]
             v = (store[s, left, 3], store[s, left, 4], store[s, left, 5])
-            p, age, fast = (store[s, left, 0], store[s, left, 1], store[s, left, 2]), now - store[s, left, STAMP], 0.0
+            p, age = (store[s, left, 0], store[s, left, 1], store[s, left, 2]), max(now - store[s, left, STAMP], 0.0)
             link, least = 0, inf
-            moved = add(p, max(age, 0.0), v)
             for k in range(starts.shape[0]):
                 # links share their ends, so that several may be as near: the first one counts, whatever rounding says
-                here = to_link(p, starts, ends, k)
-                there = to_link(moved, starts, ends, k)
-                if min(here, there) < (1.0 - 1e-9) * least:
-                    link, least = k, min(here, there)
+                away = to_link(p, starts, ends, k)
+                if away < (1.0 - 1e-9) * least:
+                    link, least = k, away
             if carriers[s] >= 0:
                 link = carriers[s]
-            if to_link(moved, starts, ends, link) < to_link(p, starts, ends, link):
-                p = moved
-            # towards the link
-            d, w = add(row(ends, link), -1.0, row(starts, link)), add(p, -1.0, row(starts, link))
-            l = min(max(dot(w, d) / max(dot(d, d), 1e-300), 0.0), 1.0)
-            way = add(add(row(starts, link), l, d), -1.0, p)
-            length = sqrt(dot(way, way))
-            step = min(numbers[APPROACH] * max(now - lost, 0.0), length - numbers[NEAREST])
-            if step > 0.0:
-                p = add(p, step / length, way)
-            towards = dot(v, way) / length if length > 0.0 else 0.0
             for c in range(3):
-                points[total, c], seen[total, c] = p[c], store[s, left, c]
-                velocities[total, c] = towards / length * way[c] if towards > 0.0 else 0.0
-            fast = max(sqrt(dot(v, v)) - numbers[PERSON], 0.0) * (max(age, 0.0) + numbers[AHEAD])
-            leads[total] = max(age, 0.0) + (store[s, left, WRONG] + fast) / max(numbers[PERSON], 1e-9)
+                seen[total, c], velocities[total, c] = p[c], v[c]
+            if now > lost:
+                d, w = add(row(ends, link), -1.0, row(starts, link)), add(p, -1.0, row(starts, link))
+                l = min(max(dot(w, d) / max(dot(d, d), 1e-300), 0.0), 1.0)
+                way = add(add(row(starts, link), l, d), -1.0, p)
+                length = sqrt(dot(way, way))
+                step = min(numbers[APPROACH] * (now - lost), length - numbers[NEAREST])
+                if step > 0.0:
+                    p = add(p, step / length, way)
+            for c in range(3):
+                points[total, c] = p[c]
+            usual = numbers[PERSON]
+            fast = person_speed(v, usual, numbers[ACCELERATION], age + numbers[AHEAD], numbers[FASTEST]) - usual
+            beyond = store[s, left, WRONG] + fast * (age + numbers[AHEAD])
+            ages[total], leads[total] = age, age + beyond / max(usual, 1e-9)
             links[total], sensors[total] = link, s
             left, total = left + 1, total + 1
         counts[s] = left

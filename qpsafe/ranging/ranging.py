@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
+from qpsafe.danger.field import DangerField
 from qpsafe.fixed import Fixed
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
+from qpsafe.ranging.checks import checked_sensors
 from qpsafe.ranging.configurations import Configurations
-from qpsafe.ranging.judge import Judge, Usable
+from qpsafe.ranging.inbox import Inbox
+from qpsafe.ranging.judge import Judge
+from qpsafe.ranging.prediction import Foresight
 from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.ranging.reduce import Reducer
-from qpsafe.ranging.rules import RangeRules
+from qpsafe.ranging.rules import OCCUPIED, RangeRules
 from qpsafe.ranging.sensor import WORLD, RangeImage, RangeSensor
-from qpsafe.ranging.watch import SensorWatch
+from qpsafe.ranging.unseen import Together
+from qpsafe.ranging.velocities import MOST, Velocities
+from qpsafe.ranging.watch import LATE, SensorWatch
 from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.detection import BadInput
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
@@ -28,6 +32,7 @@ from qpsafe.sensing.rules import SensingRules
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
+    from qpsafe.robot.wire import Wire
 
 Array = NDArray[np.float64]
 
@@ -67,7 +72,6 @@ class RangeSensing(Fixed):
         for frame, things in ({} if carried is None else carried).items():
             hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
         self._robot, count, links = robot, len(self.sensors), len(robot.wire_frames)
-        self._index = {sensor.name: i for i, sensor in enumerate(self.sensors)}
         self._judges = [Judge(sensor) for sensor in self.sensors]
         self._watches = [SensorWatch(sensor, self.rules, self.sensing) for sensor in self.sensors]
         self._reducers = [Reducer(sensor, self.rules, self.sensing, hulls, links) for sensor in self.sensors]
@@ -80,16 +84,26 @@ class RangeSensing(Fixed):
         self._patience = np.array([sensor.max_age for sensor in self.sensors], dtype=np.float64)
         self._numbers = np.array([
             0.0, self.sensing.hold_time, self.sensing.approach_speed, self.sensing.d_min, PERSON, AHEAD,
+            self.rules.acceleration, self.rules.fastest,
         ])  # fmt: skip
         total = count * room
         self._placed = np.empty((total, 3)), np.empty(total, dtype=np.int64), np.empty((total, 3))
-        self._who, self._near, self._leads = np.empty(total, dtype=np.int64), np.empty((total, 3)), np.empty(total)
+        self._who, self._near = np.empty(total, dtype=np.int64), np.empty((total, 3))
+        self._ages, self._leads = np.empty(total), np.empty(total)
         self._marks, self._chosen = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
         self._used = np.empty((2, count, links), dtype=np.int64)
+        self._tracks = [Velocities(sensor.sigma) for sensor in self.sensors] if self.rules.predict else []
+        self._foresight = Foresight(total)
+        self._together: Together | None = None
+        if count > 1 or self.rules.unseen == OCCUPIED:
+            self._together = Together(
+                self._reducers, self.sensing.tolerance, self.rules.deviations, hulls, self.sensing.approach_speed
+            )
+        self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq)
         self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
-        self._waiting: deque[Any] = deque()
+        self._inbox = Inbox(self.sensors, self.rules.budget)
         self._now, self._seen = 0.0, np.zeros(count)
         self.reset()
 
@@ -108,9 +122,14 @@ class RangeSensing(Fixed):
         """Forget everything."""
         for watch in self._watches:
             watch.reset()
+        for tracks in self._tracks:
+            tracks.reset()
         self._counts[:] = 0
+        if self._together is not None:
+            self._together.reset()
+        self._hidden_places, self._looked = _NONE, False
         self._past.reset()
-        self._waiting.clear()
+        self._inbox.reset()
         self.unseen: tuple[str, ...] = ()
         self.stopped = self._doubted = False
         self._begin = True  # sensors are waited for from the next tick on
@@ -145,13 +164,13 @@ class RangeSensing(Fixed):
         self._numbers[0], self._numbers[4] = now, person
         total = place_all(
             self._store, self._counts, self._carriers, self._patience, self._numbers, wire.starts, wire.ends,
-            *self._placed, self._who, self._near, self._leads,
+            *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
+        hidden = self._hidden(now, state, wire)
         if not total:
-            return Ranged(_NONE, _NO_LINKS, _NONE, _NONE, _NO_LEADS, tuple(notes))
+            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
         points, links, velocities = (array[:total] for array in self._placed)
-        if not self.sensing.velocities:
-            velocities[:] = 0.0
+        points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
         count = choose(
             points,
@@ -165,48 +184,39 @@ class RangeSensing(Fixed):
             self._chosen,
         )
         chosen = self._chosen[:count]
-        return Ranged(
-            points[chosen], links[chosen], velocities[chosen], self._near[:total].copy(), self._leads[:total].copy(),
-            tuple(notes),
-        )  # fmt: skip
+        near, leads = self._near[:total].copy(), self._leads[:total].copy()
+        if len(hidden):
+            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, np.zeros(len(hidden))))
+        return Ranged(points[chosen], links[chosen], velocities[chosen], near, leads, tuple(notes))
 
-    def _take_all(self, images: Any, now: float, wire: Any) -> list[str]:
+    def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
+        """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
+        if self.rules.unseen == OCCUPIED and self._looked and self._together is not None:
+            self._hidden_places, self._looked = self._together.unseen(wire, state.body_poses(), now), False
+        return self._hidden_places
+
+    def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:
+        """Where points count that come nearer, and their velocities there; at rest by a field of another making."""
+        if not velocities.any():
+            return points, velocities
+        if not self.sensing.velocities or type(field) is not DangerField:
+            return points, np.zeros_like(velocities)
+        elapsed, weights = self._ages[: len(points)] + self.rules.horizon, (field.static, field.kinetic, field.gamma)
+        return self._foresight(points, velocities, elapsed, self.sensing.d_min, wire, weights, field.floor)
+
+    def _take_all(self, images: Any, now: float, wire: Wire) -> list[str]:
         """Take the images that came, as many as there is time for; what is wrong, in words."""
-        notes: list[str] = []
-        if isinstance(images, RangeImage):
-            images = (images,)
-        if not isinstance(images, Iterable):
-            return [f"images are no list of RangeImages but {type(images).__name__}"]
-        self._waiting.extend(images)
-        budget = self.rules.budget
-        while self._waiting:
-            image = self._waiting[0]
-            who = self._index.get(image.sensor.name) if _is_image(image) else None
-            if who is None:
-                what = (
-                    f"of {image.sensor.name!r}, which is not among range_sensors"
-                    if _is_image(image)
-                    else "no RangeImage"
-                )
-                notes.append(f"an image is {what}")
-                self._waiting.popleft()
-                continue
-            budget -= len(self.sensors[who])
-            if budget < 0 and budget + len(self.sensors[who]) < self.rules.budget:
-                break  # the rest waits for the next tick
-            self._waiting.popleft()
+        taken, notes = self._inbox.take(images)
+        for who, image in taken:
             try:
                 wrong = self._take(who, image, now, wire)
             except BadInput as problem:
                 wrong = str(problem)
-            if wrong and wrong != "late":
+            if wrong and wrong != LATE:
                 notes.append(f"image of {self.sensors[who].name} unusable: {wrong}")
-        while len(self._waiting) > 4 * len(self.sensors):  # they come faster than they can be taken
-            self._waiting.popleft()
-            notes.append("images come faster than they can be taken: the oldest are left out")
         return list(dict.fromkeys(notes))
 
-    def _take(self, who: int, image: RangeImage, now: float, wire: Any) -> str:
+    def _take(self, who: int, image: RangeImage, now: float, wire: Wire) -> str:
         watch, given = self._watches[who], self._judges[who](image)
         wrong = watch.too_old(given.stamp, now)
         if wrong:
@@ -220,13 +230,20 @@ class RangeSensing(Fixed):
         wrong = watch.judged(given.stamp, self._reducers[who].distances, shown, poses if fixed else pose)
         if not wrong:
             self._seen[who] = given.stamp
-            self._renew(who, given, count)
+            velocities = self._still
+            if self._tracks:
+                around = self._reducers[who].around(count, shown.seen, MOST)
+                velocities = self._tracks[who](given.stamp, around, None if fixed else pose)[:count]
+            self._renew(who, given.stamp, count, velocities)
+            if self._together is not None:
+                self._together.take(who, given.stamp, pose, self._store, self._counts)
+                self._looked = True
         return wrong
 
-    def _renew(self, who: int, image: Usable, count: int) -> None:
+    def _renew(self, who: int, stamp: float, count: int, velocities: Array) -> None:
         kept = self._reducers[who].kept
         self._counts[who] = renew(
-            self._store[who], self._counts[who], kept, count, self._still, image.stamp, self.sensing.hold_time,
+            self._store[who], self._counts[who], kept, count, velocities, stamp, self.sensing.hold_time,
             2.0 * self.rules.apart,
         )  # fmt: skip
 
@@ -260,34 +277,10 @@ class RangeSensing(Fixed):
         return notes
 
 
-def checked_sensors(sensors: Any, robot: Robot) -> tuple[RangeSensor, ...]:
-    """Sensors that a robot's cell can hold.
-
-    Raises:
-        ConfigurationError: None, no sensors, two of one name, or one that does not fit the robot.
-    """
-    where, expected = "SafetyController", "RangeSensors, each with a name of its own"
-    if isinstance(sensors, RangeSensor | str) or not isinstance(sensors, Iterable):
-        raise ConfigurationError(where, "range_sensors", sensors, "a list of " + expected)
-    found: dict[str, RangeSensor] = {}
-    for sensor in sensors:
-        if not isinstance(sensor, RangeSensor) or sensor.name in found:
-            raise ConfigurationError(where, "range_sensors", sensor, expected)
-        sensor.check(robot)
-        found[sensor.name] = sensor
-    if not found:
-        raise ConfigurationError(where, "range_sensors", sensors, "at least one RangeSensor")
-    return tuple(found.values())
-
-
 def _mounted(robot: Robot, sensor: RangeSensor) -> tuple[int, Array]:
     """The body that carries a sensor, and its pose on it."""
     body, place = robot.mounting(sensor.mount)
     return body, place @ sensor.pose
 
 
-def _is_image(image: Any) -> bool:
-    return isinstance(image, RangeImage) and isinstance(image.sensor, RangeSensor)
-
-
-_NONE, _NO_LINKS, _NO_LEADS = np.empty((0, 3)), np.empty(0, dtype=np.int64), np.empty(0)
+_NONE, _NO_LINKS = np.empty((0, 3)), np.empty(0, dtype=np.int64)

@@ -32,3 +32,10 @@ class Spot:
     range_min: float
     range_max: float
     field_of_view: float
+
+
+def axes_along(directions: Array) -> Array:
+    """Rotations whose z axes are unit directions (..., 3), axes in columns (..., 3, 3); turned about them anyhow."""
+    x = np.cross(np.eye(3)[np.abs(directions).argmin(axis=-1)], directions)
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack((x, np.cross(directions, x), directions), axis=-1)

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from qpsafe.errors import RobotFileError
 from qpsafe.sensing.body import body_hull_set
-from qpsafe.sensing.spot import Spot
+from qpsafe.sensing.spot import Spot, axes_along
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:
@@ -148,10 +148,7 @@ def _rotation(path: Path, key: str, table: SpotTable) -> NDArray[np.float64]:
     z = np.array(table.direction)
     if not abs(float(np.linalg.norm(z)) - 1.0) <= 1e-6:
         raise RobotFileError(path, f"{key}.direction", table.direction, "a vector of length 1")
-    z /= np.linalg.norm(z)  # a person writes a few digits
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-    x /= np.linalg.norm(x)
-    return np.stack((x, np.cross(z, x), z), axis=1)
+    return axes_along(z / np.linalg.norm(z))  # a person writes a few digits
 
 
 def _check_outside(path: Path, spots: list[Spot], robot: Robot) -> None:

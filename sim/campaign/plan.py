@@ -15,7 +15,7 @@ from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -25,14 +25,13 @@ import qpsafe.sim
 import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.ranging.sets import sensor_kinds
 from qpsafe.text.json_text import json_text
 from qpsafe.text.toml_text import TomlText
 
 #: Ending of the names of controllers that are told where everybody is.
 PERFECT = "_perfect_sight"
 MOTIONS = ("hold", "line", "pick")
-Sight = Literal["ideal", "sharp", "perfect"]
-SENSORS = get_args(Sight)
 #: Compared unless a plan says otherwise.
 CONTROLLERS = (
     *("none", "stop", "stop_perfect_sight", "scaling", "nullspace", "weighted", "paper", "strict", "barrier"),
@@ -51,7 +50,8 @@ class Plan:
         robot: A bundled robot, or the path of a robot folder, MJCF or URDF file.
         motions: Some of `MOTIONS`, or paths of programs (TOML); trials take turns with them.
         controllers: Names of what is compared.
-        sensor: One of `SENSORS`, by which all controllers see that do not say otherwise.
+        sensor: By which all controllers see that do not say otherwise: `qpsafe.sim.ranging.sets.sensor_kinds`, e.g.
+            ``ideal``, ``sharp``, ``vl53l5cx``, ``sharp+depth``.
         lag: Delay of the servos, in whole ticks, whose joints are of second order then [s]; 0: they follow perfectly.
         people: A TOML file with a model of people, a story, or a folder of stories; None for the bundled model.
         trials: How many.
@@ -70,8 +70,7 @@ class Plan:
     cell: str | None = None
 
     def __post_init__(self) -> None:
-        if self.sensor not in SENSORS:
-            raise ConfigurationError("Plan", "sensor", self.sensor, "one of " + ", ".join(SENSORS))
+        sensor_kinds(self.sensor)
         if not 0.0 <= self.lag <= LONGEST_LAG:
             raise ConfigurationError("Plan", "lag", self.lag, f"0 to {LONGEST_LAG} s")
         if abs(self.lag - DT * round(self.lag / DT)) > 1e-9:  # a servo would round it
@@ -157,7 +156,7 @@ class PlanFile(BaseModel):
     robot: _Word = Plan.robot
     motions: list[_Word] = list(Plan.motions)
     controllers: list[_Word] = list(Plan.controllers)
-    sensor: Sight = "ideal"
+    sensor: _Word = Plan.sensor
     lag: Annotated[float, Field(strict=True)] = Plan.lag
     people: _Word | None = None
     cell: _Word | None = None

@@ -40,7 +40,7 @@ class Recording(NamedTuple):
         phase: ``following``, ``suspended`` or ``recovering`` (T,).
         path_time: Clock of the path (T,) [s].
         status: Number in `STATUSES` (T,).
-        points: What counted as seen at each tick (p, 3) [m].
+        points: What was seen at each tick (p, 3) [m].
     """
 
     dt: float
@@ -67,7 +67,8 @@ def record(
         lag: Of the servo [s].
         observer: Called after every tick with its number, the measured position (n,) [rad] and what was answered.
     """
-    controls, n = entry.make(station), station.robot.nq
+    # who is told where everybody is, or nothing, waits for no images
+    controls, n = entry.make(station if entry.sight == SPOTS else station.without_images), station.robot.nq
     servo = Servo(station.start, lag)
     run = np.empty((4, ticks, n))
     path_time, status = np.empty(ticks), np.empty(ticks, dtype=np.int64)
@@ -79,7 +80,7 @@ def record(
         if entry.sight == NOTHING:
             tick = controls.step(q, qd, points=_NOBODY)
         elif entry.sight == SPOTS:
-            tick = controls.step(q, qd, senses.distances(q, k))
+            tick = controls.step(q, qd, **senses.told(q, k))
         else:
             tick = controls.step(q, qd, points=told(q, k))
         reference, number = tick.reference, STATUSES.index(tick.status)
@@ -88,7 +89,7 @@ def record(
         run[0, k], run[1, k], run[2, k], run[3, k] = q, qd, reference.q, reference.qd
         path_time[k], status[k] = tick.path_time, number
         phases.append(tick.phase)
-        points.append(tick.points)
+        points.append(np.concatenate((tick.points, tick.near)) if len(tick.near) else tick.points)
         if observer is not None:
             observer(k, q, tick)
         servo.follow(reference.q, reference.qd)

@@ -1,17 +1,20 @@
-"""What a controller is told in a trial: what the spots read, Sharp sensors or ideal ones, or where everybody is."""
+"""What a controller is told in a trial: readings of spots, images of arrays and cameras, or where everybody is."""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sensing.sharp import SharpConverter
+from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.engine.sight import Sight
 from qpsafe.sim.engine.spot_rays import SpotReader
 from qpsafe.sim.engine.spot_table import SpotTable
+from qpsafe.sim.ranging.sets import range_sensors, sensor_kinds
+from qpsafe.sim.ranging.zones import ZoneSensors
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 if TYPE_CHECKING:
@@ -31,18 +34,24 @@ class Senses:
     Args:
         station: With the robot and its spots.
         tracks: Everybody.
-        sensor: ``ideal`` or ``sharp``; with ``perfect`` nobody asks for readings.
+        sensor: As for `Plan`; with ``perfect`` nobody asks for readings.
         seed: Of the sensors' noise.
     """
 
     def __init__(self, station: Station, tracks: PersonTracks, sensor: str, seed: int) -> None:
         self._station, self.tracks = station, tracks
+        kinds = sensor_kinds(sensor)
+        self._has_spots, sensor = kinds.spots is not None, kinds.spots or "ideal"
+        self._zones: ZoneSensors | None = None
+        if kinds.ranging:
+            sensors, models = range_sensors(kinds.ranging, station.robot)
+            self._zones = ZoneSensors(station.scene, station.world, sensors, models, seed=seed, units=UNITS)
         self.spots = spots = station.spots
         reach = LOOK if sensor == "sharp" else None
         self.table = SpotTable.of(station.scene, spots, reach)
         self._reader = SpotReader(station.world, self.table)
-        #: Whether readings are the true distances.
-        self.ideal = sensor != "sharp"
+        #: Whether all that is told are true distances of spots.
+        self.ideal = sensor != "sharp" and not kinds.ranging
         self._sight = Sight(station.world, station.robot)
         self._sharp: SharpSensors | None = None
         if sensor == "sharp":
@@ -57,6 +66,19 @@ class Senses:
         if self._sharp is None:
             return found
         return self._converter.distances(self._sharp.sample(found))
+
+    def told(self, q: Array, k: int) -> dict[str, Any]:
+        """What a controller that sees by sensors is told at tick k, as `SafetyController.step` takes it.
+
+        Args:
+            q: Measured (n,) [rad].
+            k: The tick.
+        """
+        given: dict[str, Any] = {"distances": self.distances(q, k)} if self._has_spots else {}
+        if self._zones is not None:
+            poses = self._station.robot.at(q).body_poses()
+            given |= {"images": self._zones.images(k * DT, poses, self.tracks.row(k)), "now": k * DT}
+        return given
 
     def people_seen(self, q: Array) -> Array:
         """Where the last readings met people (p, 3) [m]; q (n,) as then."""

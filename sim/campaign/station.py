@@ -19,13 +19,14 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
-from qpsafe.sim.campaign.servo import OMEGA
+from qpsafe.sim.campaign.servo import OMEGA, stopped, wire_speeds
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.for_robot import line_for
 from qpsafe.sim.experiments.pick_place.cell import Cell
 from qpsafe.sim.experiments.pick_place.for_robot import work_for
+from qpsafe.sim.ranging.sets import delay, range_sensors, sensor_kinds
 from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
@@ -48,8 +49,6 @@ LINE = Path(__file__).with_name("line.toml")
 RATES = (0.5, 2.0, 20.0)  # of that line, for robots that cannot follow it where it is [m/s, m/s², m/s³]
 #: Motions that have a name; any other is the path of a program's file.
 MOTIONS = ("hold", "line", "pick")
-#: How late sensors are: a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s].
-SENSOR_LATE = {"sharp": 0.055}
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Station:
         motion: One of `MOTIONS`, or the path of a program.
         robot: The robot, with spots.
         lag: Of its servos [s].
-        sensor: ``ideal``, ``sharp`` or ``perfect``.
+        sensor: As for `Plan`.
         furniture: A cell's TOML file, None for none.
     """
 
@@ -102,6 +101,11 @@ class Station:
         spots = load_spots(self.robot)
         assert spots is not None  # a station without them is refused
         return spots
+
+    @cached_property
+    def without_images(self) -> Station:
+        """The same for a controller that is told points: no sensor is waited for."""
+        return replace(self, sensor="ideal") if sensor_kinds(self.sensor).ranging else self
 
     @cached_property
     def packed(self) -> dict[str, Packed | None]:
@@ -183,7 +187,10 @@ class Station:
             parts: More arguments of `SafetyController`.
         """
         count = len(self.robot.tool_frames)
-        given: dict[str, Any] = {"known": self.known, "spots": self.spots}
+        kinds = sensor_kinds(self.sensor)
+        given: dict[str, Any] = {"known": self.known, "spots": "off" if kinds.spots is None else self.spots}
+        if kinds.ranging and "range_sensors" not in parts:
+            given["range_sensors"], _ = range_sensors(kinds.ranging, self.robot)
         thresholds = self.robot.with_parameters(parts.get("parameters", "robot"))
         given |= {"activation": robot_activation(thresholds, count, count)} | parts
         return SafetyController(self.robot, self.tasks(trajectory), law, **given)
@@ -204,7 +211,7 @@ class Station:
 
     @cached_property
     def _loner(self) -> list[Any]:
-        return [self.controller(), self.start, np.zeros(self.robot.nq)]
+        return [self.controller(range_sensors=()), self.start, np.zeros(self.robot.nq)]
 
     def _go_on_alone(self) -> None:
         controller, q, qd = self._loner
@@ -216,7 +223,7 @@ class Station:
     def separation(self) -> Separation:
         """Figures of a monitor made for this station: the delays of servo and sensors are part of its reaction time."""
         late = self.lag + 2.0 / OMEGA if self.lag > 0.0 else 0.0
-        reaction = Separation.reaction_time + late + SENSOR_LATE.get(self.sensor, 0.0)
+        reaction = Separation.reaction_time + late + delay(self.sensor, self.robot)
         return Separation(self.deceleration, reaction_time=reaction)
 
     @cached_property
@@ -227,14 +234,14 @@ class Station:
         wire that go at least half as fast as the fastest one, s the way they take to rest.
         """
         rng = np.random.default_rng(7)
-        return min(_stop(self.robot, q, qd) for q, qd in self._moments(rng))
+        return min(stopped(self.robot, q, qd) for q, qd in self._moments(rng))
 
     @cached_property
     def speed(self) -> float:
         """Of the fastest end of the wire in the nominal motion; 0 where there is none [m/s]."""
         if self.program is None:
             return 0.0
-        return max(float(_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
+        return max(float(wire_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
 
     def _moments(self, rng: np.random.Generator) -> Sequence[tuple[Array, Array]]:
         """Configurations and joint velocities from which the robot may have to stop."""
@@ -243,7 +250,7 @@ class Station:
             found = []
             for _ in range(60):
                 wild = rng.normal(size=robot.nq) * robot.max_velocity
-                found.append((robot.home, 0.5 / _speeds(robot, robot.home, wild).max() * wild))
+                found.append((robot.home, 0.5 / wire_speeds(robot, robot.home, wild).max() * wild))
             return found
         frame, found = robot.tool_frames[0], []
         q: Array = self.start
@@ -251,27 +258,9 @@ class Station:
             sample = self.program.sample(float(t))
             q = joints_for(robot, frame, sample.pose, q)
             qd = np.asarray(np.linalg.pinv(robot.jacobian(frame, q)) @ sample.twist, dtype=np.float64)
-            if _speeds(robot, q, qd).max() > 0.1:
+            if wire_speeds(robot, q, qd).max() > 0.1:
                 found.append((q, qd))
         return found
-
-
-def _speeds(robot: Robot, q: Array, qd: Array) -> Array:
-    """Of the ends of the wire [m/s]."""
-    wire = robot.wire(q, qd)
-    return np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1)
-
-
-def _stop(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
-    """a_s = v²/(2 s) of the slowest stop among the points that move [m/s²]."""
-    speeds = _speeds(robot, q, qd)
-    counted = speeds >= 0.5 * speeds.max()
-    way, v, here = np.zeros_like(speeds), qd.copy(), q.copy()
-    while np.abs(v).max() > 0.0:
-        v = v - np.clip(v, -robot.max_acceleration * dt, robot.max_acceleration * dt)
-        here = here + v * dt
-        way += dt * _speeds(robot, here, v)
-    return float((speeds[counted] ** 2 / (2.0 * way[counted])).min())
 
 
 @cache
@@ -282,7 +271,7 @@ def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", ce
         robot: A bundled name or a path, as for `load_robot`.
         motion: One of `MOTIONS`, or the path of a program.
         lag: Of the servos [s].
-        sensor: ``ideal``, ``sharp`` or ``perfect``.
+        sensor: As for `Plan`.
         cell: A TOML file of furniture, None for none.
 
     Raises:

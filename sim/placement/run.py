@@ -55,7 +55,8 @@ class MonteCarlo:
         if not (isinstance(seed, int) and seed >= 0):
             raise ConfigurationError("MonteCarlo", "seed", seed, "a whole number >= 0")
         robot_file = robot.folder if (robot.folder / "robot.toml").is_file() else robot.model_path
-        self.setup = Setup(robot_file, candidates.nodes, seed, float(radius), float(pedestal))
+        zones = candidates.sensor.directions
+        self.setup = Setup(robot_file, candidates.nodes, zones, candidates.free, seed, float(radius), float(pedestal))
 
     def sample(
         self,

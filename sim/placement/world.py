@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DUMMY = 1  # geometry group
+_FAR = 10.0  # no two shapes that matter are farther from each other [m]
 _FREE = 7  # numbers of a free body's pose
 _DUMMY_BIT, _GROUND_BIT = 1 << 20, 1 << 21  # contact bits that no robot's model is likely to use
 
@@ -76,6 +77,8 @@ class PlacementWorld:
         self.data.qpos[self._held[0]] = self._held[1]
         body_names = [model.body(i).name for i in range(model.nbody)]
         self._dummy = np.array([body_names[b].startswith("dummy/") for b in model.geom_bodyid])
+        solid = (model.geom_group == ROBOT_COLLISION) & (model.body_weldid[model.geom_bodyid] != 0)
+        self._moving, self._segments = np.flatnonzero(solid), np.flatnonzero(self._dummy)
         joints = [model.joint(f"robot/{name}") for name in robot.joint_names]
         self._q = np.array([int(joint.qposadr[0]) for joint in joints], dtype=np.intp)
         first = [model.joint(model.body(f"dummy/{s.name}").jntadr[0]).qposadr[0] for s in SEGMENTS]
@@ -121,31 +124,62 @@ class PlacementWorld:
             return int(self.model.joint("robot/" + self.robot.model.names[joint]).bodyid[0])
         return int(self.model.body_parentid[self.model.joint("robot/" + self.robot.joint_names[0]).bodyid[0]])
 
+    def nearest(self, q: Array, capsules: Array) -> tuple[Array, float]:
+        """The dummy's point that is nearest to what moves of the robot, (3,) [m], and its distance [m].
+
+        Args:
+            q: Of the robot, (n,) [rad].
+            capsules: Ends of the dummy's, (17, 2, 3) [m].
+        """
+        self.place(q, capsules)
+        centres, radii = self.data.geom_xpos, self.model.geom_rbound
+        # pairs of shapes, those first whose bounding balls are nearest to each other
+        between = np.linalg.norm(centres[self._moving][:, None] - centres[self._segments], axis=2)
+        least = between - radii[self._moving][:, None] - radii[self._segments]
+        found, best, segment = np.full(3, np.nan), np.inf, np.empty(6)
+        for pair in np.argsort(least, axis=None, kind="stable"):
+            i, k = divmod(int(pair), len(self._segments))
+            if least[i, k] >= best:
+                break
+            distance = mujoco.mj_geomDistance(
+                self.model, self.data, self._moving[i], self._segments[k], min(best, _FAR), segment
+            )
+            if distance < best:
+                best, found = distance, segment[3:].copy()
+        return found, best
+
+    def put(self, batch: Any, q: Array, capsules: Array) -> None:
+        """Put the robots and dummies of a batch in place.
+
+        Args:
+            batch: A `mujoco.batch.Batch` of this model with at least k simulations.
+            q: Of the robots, (k, n) [rad].
+            capsules: Ends of the dummies', (k, 17, 2, 3) [m].
+        """
+        k, qpos = len(q), batch.bind("qpos")
+        qpos[:k, self._held[0]] = self._held[1]
+        qpos[:k, self._q] = q
+        qpos[:k, self._poses] = capsule_poses(capsules.reshape(-1, 2, 3)).reshape(k, len(SEGMENTS), _FREE)
+
     def cast(
-        self, batch: Any, q: Array, capsules: Array, origins: Array, directions: Array, own: NDArray[np.int32]
+        self, batch: Any, p: int, origins: Array, directions: Array, own: NDArray[np.int32]
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """What rays meet first.
 
         Args:
-            batch: A `mujoco.batch.Batch` of this model with at least k simulations.
-            q: Of the robot, (k, n) [rad].
-            capsules: Ends of the dummy's, (k, 17, 2, 3) [m].
-            origins: Of the rays, (k, m, 3) [m].
-            directions: Of the rays, unit, (k, m, 3).
+            batch: A `mujoco.batch.Batch` of this model, see `put`.
+            p: Which of its simulations.
+            origins: Of the rays, (m, 3) [m].
+            directions: Of the rays, unit, (m, 3).
             own: Body that each ray does not see, (m,).
 
         Returns:
-            Distances (k, m) [m], +inf for nothing; whether it is the dummy, and whether the robot.
+            Distances (m,) [m], +inf for nothing; whether it is the dummy, and whether the robot.
         """
-        k = len(q)
-        qpos = batch.bind("qpos")
-        qpos[:k, self._held[0]] = self._held[1]
-        qpos[:k, self._q] = q
-        qpos[:k, self._poses] = capsule_poses(capsules.reshape(-1, 2, 3)).reshape(k, len(SEGMENTS), _FREE)
         seen = np.zeros(mujoco.mjNGROUP, dtype=np.uint8)
         seen[[SCENERY, DUMMY, ROBOT_COLLISION]] = 1
-        ids = np.arange(k)
-        distance, geom = batch.ray(origins, directions, geomgroup=seen, bodyexclude=own, ids=ids)
+        found = batch.ray(origins, directions, geomgroup=seen, bodyexclude=own, ids=[p])
+        distance, geom = (of_all.reshape(len(origins)) for of_all in found)
         hit = distance >= 0.0
         dummy = hit & self._dummy[geom]
         robot = hit & (self.model.geom_group[geom] == ROBOT_COLLISION)

@@ -27,7 +27,7 @@ class DepthCameraModel:
         scale: Of a unit of depth [m].
         near: What is nearer is not seen, and reads 0 [m].
         far: Where the walls are that everything else is before [m] (*).
-        edge: A step in z by which two neighbours are an edge [m] (*).
+        edge: A step in z between two neighbours, beyond what a plane would have there, that is an edge [m] (*).
         holes: Probability that a pixel at an edge reads 0 (*).
         lost: Probability that any pixel does (*).
         latency: From exposure until the frame is there [s] (*).
@@ -84,12 +84,7 @@ class DepthCameraUnit:
         """
         model, shape = self._model, self._sensor.shape
         z = np.minimum(distances * self._sensor.directions[:, 2], model.far).reshape(shape)
-        jump = np.zeros(shape, dtype=bool)
-        for axis in (0, 1):
-            step = np.abs(np.diff(z, axis=axis)) > model.edge
-            for side in ((1, 0), (0, 1)):
-                jump |= np.pad(step, [side if a == axis else (0, 0) for a in (0, 1)])
-        chance = rng.random(shape)
+        jump, chance = edges(z, model.edge), rng.random(shape)
         hole = (z < model.near) | (jump & (chance < model.holes)) | (chance > 1.0 - model.lost)
         told = z + model.sigma_1m * z * z * rng.normal(size=shape)
         depth = np.clip(np.rint(told / model.scale), 1, np.iinfo(np.uint16).max)
@@ -105,3 +100,29 @@ class DepthCameraUnit:
             rng: Of noise.
         """
         return self._adapter.image(self.frame(distances, rng), stamp=stamp)
+
+
+def edges(z: Array, step: float) -> NDArray[np.bool_]:
+    """The pixels on both sides of an edge of a depth image (rows, columns).
+
+    In a picture of a plane 1/z is linear, so that its differences are all the same however inclined the plane is. Where
+    one differs from those on both of its sides, z jumps; at a fold it is the same as one of them.
+
+    Args:
+        z: Depth [m].
+        step: What a jump has to be [m].
+    """
+    found = np.zeros(z.shape, dtype=bool)
+    for picture, mark in ((z, found), (z.T, found.T)):
+        near = 1.0 / np.maximum(picture, 1e-3)
+        rise = np.diff(near, axis=0)
+        if len(rise) < 3:
+            continue
+        bend = np.abs(np.diff(rise, axis=0))  # between a difference and the next
+        excess = np.empty_like(rise)
+        excess[1:-1] = np.minimum(bend[:-1], bend[1:])
+        excess[0], excess[-1] = bend[0], bend[-1]  # at the border there is one neighbour
+        jump = excess > step * near[:-1] * near[1:]  # d(1/z) = -dz / z²
+        mark[:-1] |= jump
+        mark[1:] |= jump
+    return found

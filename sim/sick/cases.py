@@ -30,13 +30,13 @@ class Record(NamedTuple):
     q: Array
     qd: Array
     gap: float  # robot to board or person [m]
-    moved: float  # by the point that the first sick spot meant when the fault began [m]
+    moved: float  # by the point that the first sick spot meant when the fault began, or by the sick sensor [m]
 
 
 class Window(NamedTuple):
     """A copy of the run from the moment on, with a fault."""
 
-    sick: NDArray[np.intp]  # spots
+    sick: NDArray[np.intp]  # spots, or range sensors
     names: tuple[str, ...]
     before: Array  # readings in the tick before the fault
     healthy: Record  # the first tick as it would have been
@@ -75,7 +75,8 @@ class Case(NamedTuple):
     reaction: Callable[[Window], Reaction]
 
 
-def _first(window: Window, holds: Callable[[Record], bool]) -> Reaction:
+def first_tick(window: Window, holds: Callable[[Record], bool]) -> Reaction:
+    """The first tick of which something holds."""
     return Reaction(next((k + 1 for k, record in enumerate(window.ticks) if holds(record)), None))
 
 
@@ -87,7 +88,7 @@ def _reported(window: Window) -> Reaction:
     dead = window.rules.ticks(window.rules.dead_after, window.dt)
     capped = all(record.severity == CAPPED for record in window.ticks[dead - 1 :])
     good = first.status == "degraded" and name in first.unseen and kept and capped and window.after == "clear"
-    return _first(window, lambda record: name in record.unseen) if good else Reaction(None)
+    return first_tick(window, lambda record: name in record.unseen) if good else Reaction(None)
 
 
 def _slowed(window: Window) -> Reaction:
@@ -110,7 +111,7 @@ def _held(window: Window) -> Reaction:
 
 def _counted(window: Window) -> Reaction:
     i = window.sick[0]
-    return _first(window, lambda record: record.counted[i] <= 0.3 and record.cdf_n >= window.healthy.cdf_n - 1e-9)
+    return first_tick(window, lambda record: record.counted[i] <= 0.3 and record.cdf_n >= window.healthy.cdf_n - 1e-9)
 
 
 def _unmoved(window: Window) -> Reaction:

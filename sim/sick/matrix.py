@@ -1,5 +1,7 @@
 """Sick sensors in closed loop: every case of docs/reference/sensing.md, injected at random moments of experiment one.
 
+With spots their readings are spoilt, with sensors of many zones their images.
+
 The healthy run is simulated once. At every moment it is copied, and each copy goes on with another fault for a while.
 What is checked: no contact that the healthy run did not have, no limit passed, and the reaction that the table states
 within the ticks that it states.
@@ -16,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sensing.speed_cap import wire_speed
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
-from qpsafe.sim.sick.cases import CASES, WINDOW, Case, Reaction, Record, Window
-from qpsafe.sim.world.distance import TrueDistances
+from qpsafe.sim.sick.cases import CASES, WINDOW, Case
+from qpsafe.sim.sick.frame_cases import FRAME_CASES, FrameCase
+from qpsafe.sim.sick.moment import Outcome, at_moment
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -87,7 +89,7 @@ def run_matrix(
     experiment: FixedExperiment,
     count: int = 20,
     seed: int = 0,
-    cases: Sequence[Case] = CASES,
+    cases: Sequence[Case] | Sequence[FrameCase] | None = None,
     jobs: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
@@ -95,21 +97,25 @@ def run_matrix(
 
     Args:
         experiment: The first experiment.
-        count: Number of moments, at random while a spot sees something during an approach.
-        seed: Of the moments and of the spots that fall sick.
-        cases: Lines of the table.
+        count: Number of moments, at random while somebody is seen during an approach.
+        seed: Of the moments and of the sensors that fall sick.
+        cases: Lines of the table; by default those of images where the experiment has sensors that make some.
         jobs: Processes, where the system can fork; 1 elsewhere.
         progress: Called with work done and to do.
     """
     moments = random_moments(experiment, 5 * count, seed)
     copies: list[tuple[FixedLoop, Array]] = []
     loop = FixedLoop(experiment)
+    if cases is None:
+        cases = CASES if loop.ranging is None else FRAME_CASES
     total = moments[-1] + 1 + count * (len(cases) + 1) * WINDOW
-    reading = np.full(0, np.inf)
+    reading, seen = np.full(0, np.inf), False
     for k in range(moments[-1] + 1):
-        if k in moments and np.isfinite(reading).any():  # where nobody sees anything there is nothing to lose
+        if k in moments and seen:  # where nobody sees anything there is nothing to lose
             copies += [(loop.copy(), reading)] * moments.count(k)
-        reading = loop.step().distances
+        moment = loop.step()
+        reading = moment.distances
+        seen = bool(np.isfinite(reading).any() if loop.ranging is None else len(moment.tick.points))
         loop.advance()
         if progress is not None and k % 100 == 0:
             progress(k, total)
@@ -117,7 +123,7 @@ def run_matrix(
         raise ConfigurationError("run_matrix", "count", count, f"at most {counted(len(copies), 'moment')} for this run")
     chosen = np.random.default_rng((seed, 1)).permutation(len(copies))[:count]
     work = [(*copies[n], cases, seed + i) for i, n in enumerate(np.sort(chosen))]
-    done: list[list[tuple[Reaction, bool, float, float, float]]] = []
+    done: list[list[Outcome]] = []
     if jobs > 1 and "fork" in multiprocessing.get_all_start_methods():
         _WORK[:] = work
         with multiprocessing.get_context("fork").Pool(jobs, initializer=_plain_signals) as pool:
@@ -130,13 +136,15 @@ def run_matrix(
         _WORK.clear()
     else:
         for task in work:
-            done.append(_moment(*task))
+            done.append(at_moment(*task))
             if progress is not None:
                 progress(total - (count - len(done)) * (len(cases) + 1) * WINDOW, total)
     return [_summary(case, [item[c] for item in done]) for c, case in enumerate(cases)]
 
 
-_WORK: list[tuple[FixedLoop, Array, Sequence[Case], int]] = []  # inherited by forked processes, never pickled
+_WORK: list[
+    tuple[FixedLoop, Array, Sequence[Case] | Sequence[FrameCase], int]
+] = []  # inherited by forked processes, never pickled
 
 
 def _plain_signals() -> None:
@@ -145,12 +153,12 @@ def _plain_signals() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
-def _inherited(n: int) -> list[tuple[Reaction, bool, float, float, float]]:
-    return _moment(*_WORK[n])
+def _inherited(n: int) -> list[Outcome]:
+    return at_moment(*_WORK[n])
 
 
-def _summary(case: Case, rows: list[tuple[Reaction, bool, float, float, float]]) -> Result:
-    reactions = [row[0] for row in rows]
+def _summary(case: Case | FrameCase, rows: list[Outcome]) -> Result:
+    reactions = [row.reaction for row in rows]
     return Result(
         case=case.name,
         promise=case.promise,
@@ -159,94 +167,8 @@ def _summary(case: Case, rows: list[tuple[Reaction, bool, float, float, float]])
         applied=sum(r.applies for r in reactions),
         slowest=max((r.tick or 0 for r in reactions if r.applies), default=0),
         missing=sum(r.tick is None for r in reactions),
-        contacts=sum(row[1] for row in rows),
-        passed=max(row[2] for row in rows),
-        nearest=min(row[3] for row in rows),
-        nearest_healthy=min(row[4] for row in rows),
+        contacts=sum(row.contact for row in rows),
+        passed=max(row.passed for row in rows),
+        nearest=min(row.nearest for row in rows),
+        nearest_healthy=min(row.nearest_healthy for row in rows),
     )
-
-
-def _moment(
-    loop: FixedLoop, before: Array, cases: Sequence[Case], seed: int
-) -> list[tuple[Reaction, bool, float, float, float]]:
-    """All cases at one moment: reaction, whether there was a new contact, excess over limits, distances."""
-    rng = np.random.default_rng(seed)
-    count = len(before)
-    twin = loop.copy()
-    healthy = _play(twin, np.zeros(0, dtype=np.intp), before, None)
-    quiet = min(record.gap for record in healthy)
-    results = []
-    for case in cases:
-        seeing = np.flatnonzero(np.isfinite(before))
-        first = int(rng.choice(seeing)) if len(seeing) else int(rng.integers(count))
-        number = max(round(case.share * count), 1)
-        others = rng.permutation(np.delete(np.arange(count), first))
-        sick = np.concatenate(([first], others[: number - 1])).astype(np.intp)
-        copy = loop.copy()
-        ticks = _play(copy, sick, before, case)
-        copy.controller.acknowledge()
-        sensing = copy.controller.sensing
-        assert sensing is not None
-        window = Window(
-            sick,
-            sensing.spots.names,
-            before,
-            healthy[0],
-            ticks,
-            sensing.health.severity,
-            copy.controller.rules,
-            copy.controller.dt,
-        )
-        gap = min(record.gap for record in ticks)
-        results.append((case.reaction(window), gap <= 0.0 < quiet, _excess(loop, ticks), gap, quiet))
-    return results
-
-
-def _play(loop: FixedLoop, sick: NDArray[np.intp], before: Array, case: Case | None) -> list[Record]:
-    """Go on for a window, the sick spots spoilt for as long as the case says."""
-    records: list[Record] = []
-    sensing, robot = loop.controller.sensing, loop.controller.robot
-    assert sensing is not None
-    anchor, gaps = None, TrueDistances(loop.scene)
-    for k in range(WINDOW):
-        fault = None
-        if case is not None and k < case.lasts:
-
-            def fault(distances: Array, case: Case = case) -> tuple[Array, Array]:
-                spoilt, ages = distances.copy(), np.zeros(len(distances))
-                spoilt[sick], ages[sick] = case.spoil(distances[sick], before[sick])
-                return spoilt, ages
-
-        moment = loop.step(fault)
-        tick = moment.tick
-        moved = 0.0
-        if len(sick) and np.isfinite(before[sick[0]]):
-            point = sensing.spots.points(moment.state, np.where(np.isfinite(before), before, 0.0))[sick[0]]
-            anchor = point if anchor is None else anchor
-            moved = float(np.linalg.norm(point - anchor))
-        records.append(
-            Record(
-                tick.status,
-                tick.severity,
-                tick.unseen,
-                sensing.counted,
-                tick.cdf_n,
-                wire_speed(tick.reference.qd, robot.at(tick.reference.q)),
-                tick.reference.q,
-                tick.reference.qd,
-                min(found.distance for found in gaps.measure(loop.plant.data)),
-                moved,
-            )
-        )
-        loop.advance()
-    return records
-
-
-def _excess(loop: FixedLoop, ticks: list[Record]) -> float:
-    """Largest excess over a joint limit of the references: position [rad], velocity and acceleration relative to it."""
-    robot, dt = loop.controller.robot, loop.controller.dt
-    q, qd = np.array([record.q for record in ticks]), np.array([record.qd for record in ticks])
-    position = max((robot.lower - q).max(), (q - robot.upper).max())
-    velocity = (np.abs(qd) / robot.max_velocity).max() - 1.0
-    acceleration = (np.abs(np.diff(qd, axis=0)) / (robot.max_acceleration * dt)).max() - 1.0
-    return float(max(position, velocity, acceleration))

@@ -74,8 +74,8 @@ def place() -> list[str]:
     return [
         f"{1e3 * free['spacing']:.1f} mm for {free['nodes']} nodes",
         f"wire reaches ({free['radius']:.2f} m)",
-        f"20 bytes a detection ({per_pair:.0f} a pair here)",
-        f"That makes {300_000 * (20 * per_pair + 16) / 1e6:.0f} MB for each sample",
+        f"21 bytes a detection ({per_pair:.0f} a pair here)",
+        f"That makes {300_000 * (21 * per_pair + 16) / 1e6:.0f} MB for each sample",
         f"89 % needs {len(fewest['spots'])} spots by (13)",
         f"greedy takes {first('detection', 0, 0.89)}.",
         f"these {len(fewest['spots'])} detect {100 * fair['probability']:.1f} % "
@@ -87,6 +87,28 @@ def place() -> list[str]:
         "falls by 3 % only",
         f"puts {waist} of them on the waist",
         f"they detect {100 * inside['probability']:.1f} % ({100 * inside['low']:.1f} to {100 * inside['high']:.1f})",
+        *arrays(inside),
+    ]
+
+
+def arrays(spots: dict[str, Any]) -> list[str]:
+    found = measured("place-arrays")
+    assert found["wanted"] == "nearest"
+
+    def first(objective: str, what: str, at_least: float) -> int:
+        """The fewest whose share on the independent pairs is that large, and stays so."""
+        values = found["curves"][objective][what][1]
+        return 1 + max(k for k, value in enumerate(values) if value < at_least)
+
+    waist = sum(name.startswith("waist") for name in found["placements"]["nearest"]["spots"])
+    return [
+        f"To detect 95 % takes {first('detection', 'probability', 0.95)} arrays, "
+        f"99 % takes {first('detection', 'probability', 0.99)}",
+        f"(5 detect {100 * found['curves']['detection']['probability'][1][5]:.1f} %)",
+        f"20 Sharps see that part of {100 * spots['nearest']:.0f} % of the people",
+        f"To see the nearest part of 95 % takes {first('nearest', 'nearest', 0.95)} arrays, "
+        f"of 99 % takes {first('nearest', 'nearest', 0.99)}",
+        f"are on the waist ({waist})",
     ]
 
 

@@ -40,7 +40,9 @@ PLAN = {
         str | None, typer.Option(help="A bundled robot, or the path of a robot folder, MJCF or URDF file.")
     ],
     "motions": Annotated[str | None, typer.Option(help="hold, line, pick or program files, separated by commas.")],
-    "sensor": Annotated[str | None, typer.Option(help="Sensor model: ideal, sharp or perfect.")],
+    "sensor": Annotated[
+        str | None, typer.Option(help="Sensors: ideal, sharp, perfect, vl53l5cx, depth, or sharp+depth.")
+    ],
     "lag": Annotated[float | None, typer.Option(help="Servo lag, a multiple of 0.004 [s]; 0: perfect following.")],
     "people": Annotated[
         Path | None, typer.Option(help="TOML file with a model of people or a story, or a folder of these.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,11 +44,15 @@ class Monitor:
         self.separation = station.separation if separation is None else separation
         self.robot = station.robot
         self._bodies = Bodies(station.world, station.robot)
-        self._sensing = station.controller(**AS_IN_PAPER).sensing
+        controller = station.controller(**AS_IN_PAPER)
+        self._sensing, self._ranging, self._field = controller.sensing, controller.ranging, controller.field
         #: Points seen at the last tick (p, 3) [m].
         self.seen = np.empty((0, 3))
 
-    def gaps(self, q: Array, qd: Array, distances: ArrayLike | None, points: ArrayLike | None) -> Gaps | None:
+    def gaps(
+        self, q: Array, qd: Array, distances: ArrayLike | None, points: ArrayLike | None, images: Any = None,
+        now: float = 0.0,
+    ) -> Gaps | None:  # fmt: skip
         """What is near; None where too many sensors cannot be trusted.
 
         Args:
@@ -56,9 +60,13 @@ class Monitor:
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
             points: Instead (p, 3) [m].
+            images: Of range sensors, beside distances or in their place.
+            now: Present time on the clock of their stamps [s].
         """
         state = self.robot.at(q)
-        if distances is None:
+        if distances is None and points is None:
+            seen = np.empty((0, 3))
+        elif distances is None:
             seen = np.asarray(points, dtype=float).reshape(-1, 3)
         elif self._sensing is None:
             raise BadInput("distances are given but the robot has no spots")
@@ -67,6 +75,11 @@ class Monitor:
             if found.too_many:
                 return None
             seen = found.points
+        if self._ranging is not None and images is not None:
+            try:
+                seen = np.concatenate((seen, self._ranging.update(images, now, state, self._field, qd).near))
+            except BadInput:
+                return None
         self.seen = seen
         near = self._bodies.to_points(state, seen, FAR)
         return Gaps(near.distance, near.rows)

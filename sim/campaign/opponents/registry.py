@@ -40,14 +40,14 @@ SPOTS, POINTS, NOTHING = "spots", "points", "nothing"  # what a controller is to
 class Controls(Protocol):
     """What a trial needs of a controller: `SafetyController.step`'s form."""
 
-    def step(self, q: NDArray, qd: NDArray, distances: ArrayLike | None = None, *, points: Any = None) -> Tick:
+    def step(self, q: NDArray, qd: NDArray, distances: ArrayLike | None = None, **told: Any) -> Tick:
         """One tick; never raises on data.
 
         Args:
             q: Measured (n,) [rad].
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
-            points: Instead (p, 3) [m].
+            told: Instead `points` (p, 3) [m], or `images` and the time `now` [s] where the campaign has range sensors.
         """
         ...
 

@@ -72,13 +72,16 @@ class PathScaling:
 
     def __init__(self, station: Station, separation: Separation | None = None) -> None:
         self._clock = Clocked(station.reference)
-        self._controller = station.controller(trajectory=self._clock, **AS_IN_PAPER)
+        self._controller = station.controller(trajectory=self._clock, range_sensors=(), **AS_IN_PAPER)
         self._monitor = Monitor(station, separation)
         self._robot, self._dt = station.robot, self._controller.dt
         self._speed = max(station.speed, 0.05)
         self._tolerance = self._controller.recovery_rules.tolerance
 
-    def step(self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None) -> Tick:
+    def step(
+        self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None,
+        images: Any = None, now: float = 0.0,
+    ) -> Tick:  # fmt: skip
         """One tick, as `SafetyController.step`.
 
         Args:
@@ -86,8 +89,14 @@ class PathScaling:
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
             points: Instead (p, 3) [m].
+            images: Of range sensors.
+            now: Present time on the clock of their stamps [s].
         """
-        gaps, clock, separation = self._monitor.gaps(q, qd, distances, points), self._clock, self._monitor.separation
+        gaps, clock, separation = (
+            self._monitor.gaps(q, qd, distances, points, images, now),
+            self._clock,
+            self._monitor.separation,
+        )
         allowed, fall = 0.0, separation.deceleration * self._dt / self._speed
         if gaps is not None and not len(gaps.distances):
             allowed = 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,7 +43,10 @@ class Separated:
         )
         self._tolerance = self._controller.recovery_rules.tolerance
 
-    def step(self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None) -> Tick:
+    def step(
+        self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None,
+        images: Any = None, now: float = 0.0,
+    ) -> Tick:  # fmt: skip
         """One tick, as `SafetyController.step`.
 
         Args:
@@ -51,8 +54,10 @@ class Separated:
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
             points: Instead (p, 3) [m].
+            images: Of range sensors.
+            now: Present time on the clock of their stamps [s].
         """
-        tick, clock = self._controller.step(q, qd, distances, points=points), self._clock
+        tick, clock = self._controller.step(q, qd, distances, points=points, images=images, now=now), self._clock
         # of every task; none where the robot only brakes
         behind = max([float(np.linalg.norm(error)) for error in tick.errors], default=np.inf)
         clock.rate = min(max((LAG - behind) / (LAG - FREE), 0.0), 1.0)

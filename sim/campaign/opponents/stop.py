@@ -7,7 +7,7 @@ shape, braking at the joints' limits at once, and work that goes on by itself, b
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,14 +36,17 @@ class StopOnly:
     """
 
     def __init__(self, station: Station, separation: Separation | None = None, hysteresis: float = 0.05) -> None:
-        self._controller = station.controller(**AS_IN_PAPER)
+        self._controller = station.controller(range_sensors=(), **AS_IN_PAPER)
         self._monitor = Monitor(station, separation)
         self._again = float(self._monitor.separation.distance(station.speed)) + hysteresis
         self._robot, self._dt = station.robot, self._controller.dt
         self._stopping = False
         self._tick: Tick | None = None
 
-    def step(self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None) -> Tick:
+    def step(
+        self, q: Array, qd: Array, distances: ArrayLike | None = None, *, points: ArrayLike | None = None,
+        images: Any = None, now: float = 0.0,
+    ) -> Tick:  # fmt: skip
         """One tick, as `SafetyController.step`.
 
         Args:
@@ -51,8 +54,10 @@ class StopOnly:
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
             points: Instead (p, 3) [m].
+            images: Of range sensors.
+            now: Present time on the clock of their stamps [s].
         """
-        gaps = self._monitor.gaps(q, qd, distances, points)
+        gaps = self._monitor.gaps(q, qd, distances, points, images, now)
         if self._tick is None:
             free = True  # at rest
         elif gaps is None:

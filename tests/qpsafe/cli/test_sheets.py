@@ -190,7 +190,7 @@ def of_place(screen: Console, folder: Path) -> None:
     from qpsafe.placement.milp import Solution
     from qpsafe.placement.study import Judgement
 
-    judged = Judgement(0.8912, 0.8812, 0.9012, 0.4512, 1.0)
+    judged = Judgement(0.8912, 0.8812, 0.9012, 0.4512, 1.0, 0.7612, 0.7512, 0.7712)
     item = SimpleNamespace(
         fair=judged, flattered=judged, solution=Solution(np.arange(20), 2500.0, 2600.0, "sorting", 123.4)
     )

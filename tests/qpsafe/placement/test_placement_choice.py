@@ -16,6 +16,7 @@ from qpsafe.placement.knapsack import cheapest_order, cost
 from qpsafe.placement.milp import best_choice, least_spots
 from qpsafe.placement.sample import Detections, Sample
 from qpsafe.placement.statistics import clopper_pearson
+from qpsafe.placement.study import judge
 
 NODES, PAIRS = 12, 40
 
@@ -28,9 +29,8 @@ def sample_of(seed: int, nodes: int = NODES, pairs: int = PAIRS, density: float 
     which = np.nonzero(seen)[1]
     best = np.zeros(pairs)
     np.maximum.at(best, np.nonzero(seen)[0], danger)
-    part = Detections(
-        seen.sum(axis=1), which, danger, rng.uniform(0, 1, len(danger)), best + rng.uniform(0.1, 1, pairs)
-    )
+    torque, peak = rng.uniform(0, 1, len(danger)), best + rng.uniform(0.1, 1, pairs)
+    part = Detections(seen.sum(axis=1), which, danger, torque, peak, rng.random(len(danger)) < 0.4)
     return Sample.collect(nodes, [part])
 
 
@@ -131,7 +131,12 @@ def test_curves_are_monotone_and_end_where_all_nodes_do(seed: int) -> None:
 def test_a_second_node_that_sees_the_same_pays_for_cost_and_for_nothing_else() -> None:
     """Nodes 0 and 1 see pair 0 alike, node 2 sees pair 1 with less danger."""
     part = Detections(
-        np.array([2, 1]), np.array([0, 1, 2]), np.array([5.0, 5.0, 1.0]), np.ones(3), np.array([6.0, 6.0])
+        np.array([2, 1]),
+        np.array([0, 1, 2]),
+        np.array([5.0, 5.0, 1.0]),
+        np.ones(3),
+        np.array([6.0, 6.0]),
+        np.ones(3) > 0,
     )
     sample = Sample.collect(3, [part])
     links = np.zeros(3, dtype=np.int64)
@@ -140,6 +145,21 @@ def test_a_second_node_that_sees_the_same_pays_for_cost_and_for_nothing_else() -
         assert set(greedy(3, sample.node, worth).order[:2]) == {0, 2}
     apart = seen_by_links(sample, np.array([0, 1, 1]), sample.danger)  # each link evades by its own danger vector
     assert set(greedy(3, sample.node, apart).order[:2]) == {0, 1}
+
+
+def test_the_nearest_part_is_seen_where_a_near_detection_is() -> None:
+    sample = sample_of(8)
+    close = sample.nearest()
+    seen = np.zeros((PAIRS, NODES), dtype=bool)
+    seen[sample.pair[sample.near], sample.node[sample.near]] = True
+    assert 0 < seen.sum() < len(sample.node)
+    assert (table(close) == np.where(seen, table(sample), 0.0)).all()
+    order = greedy(NODES, close.node, detected_pairs(close)).order
+    for k in range(NODES + 1):
+        assert ((close.seen_by(order[:k]) > 0) == seen[:, order[:k]].any(axis=1)).all()
+        judged = judge(sample, order[:k])
+        assert judged.nearest == pytest.approx(seen[:, order[:k]].any(axis=1).mean())
+        assert judged.nearest_low <= judged.nearest <= judged.probability
 
 
 def test_the_standard_error_of_the_cost_is_that_of_the_mean_over_pairs() -> None:
@@ -154,14 +174,13 @@ def test_the_standard_error_of_the_cost_is_that_of_the_mean_over_pairs() -> None
 def test_parts_of_a_sample_put_together_are_the_sample() -> None:
     whole = sample_of(6)
     cut = int(whole.first[17])
+    own = (whole.node, whole.danger, whole.torque)
     parts = [
-        Detections(
-            np.diff(whole.first)[a:b], whole.node[c:d], whole.danger[c:d], whole.torque[c:d], whole.peak[a:b], 2, 3
-        )
+        Detections(np.diff(whole.first)[a:b], *(x[c:d] for x in own), whole.peak[a:b], whole.near[c:d], 2, 3)
         for a, b, c, d in ((0, 17, 0, cut), (17, PAIRS, cut, len(whole.node)))
     ]
     again = Sample.collect(NODES, parts)
-    for key in ("first", "node", "danger", "torque", "peak"):
+    for key in ("first", "node", "danger", "torque", "peak", "near"):
         np.testing.assert_array_equal(getattr(again, key), getattr(whole, key))
     assert (again.on_robot, again.too_near) == (4, 6)
 

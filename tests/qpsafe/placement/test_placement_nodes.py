@@ -11,10 +11,11 @@ import pytest
 
 import qpsafe
 from qpsafe.errors import ConfigurationError, RobotFileError
-from qpsafe.placement.candidates import Candidates, Sensor, _Patch, candidate_nodes, node_pose
+from qpsafe.placement.candidates import BLIND, Candidates, Sensor, _Patch, candidate_nodes, node_pose
 from qpsafe.placement.grid import NEAREST, lattice, thin_out
-from qpsafe.placement.sight import SelfSight
-from qpsafe.placement.sight import _cone as self_sight_cone
+from qpsafe.placement.objective import SensorName
+from qpsafe.placement.sensors import SENSORS
+from qpsafe.placement.sight import SelfSight, zone_rays
 from qpsafe.placement.spots_toml import spots_toml
 from qpsafe.placement.surface import link_surface, model_body
 from qpsafe.robot.robot import Robot
@@ -94,7 +95,7 @@ def test_self_sight_is_that_of_every_ray_cast_in_every_pose() -> None:
     data, group = mujoco.MjData(model), np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
     model.geom_group[:] = np.where((model.geom_contype != 0) | (model.geom_conaffinity != 0), 3, 2)
     own = model_body(model, ROBOT, region.frame)
-    cone, hit = self_sight_cone(normals, np.deg2rad(6.0)), np.zeros(1, dtype=np.int32)
+    cone, hit = zone_rays(normals, sight.zones), np.zeros(1, dtype=np.int32)
     near = np.zeros((len(sight.configurations), len(points)), dtype=bool)
     for i, q in enumerate(sight.configurations):
         data.qpos[:] = q
@@ -169,6 +170,55 @@ def test_a_placement_written_is_what_the_controller_loads(nodes: Candidates, tmp
     assert spots.directions == pytest.approx(nodes.nodes.directions[chosen], abs=1e-6)
     assert spots.range_max == pytest.approx(0.8)
     assert spots.field_of_view == pytest.approx(np.deg2rad(6.0))
+
+
+@pytest.fixture(scope="module")
+def arrays() -> Candidates:
+    return candidate_nodes(ROBOT, spacing=0.12, sensor=SENSORS[SensorName.vl53l5cx])
+
+
+def test_arrays_written_are_what_is_loaded_zone_by_zone(arrays: Candidates, tmp_path: Path) -> None:
+    """Their zones look where the placement looked, up to what a square that is turned by a quarter looks at."""
+    path = tmp_path / "spots-vl53l5cx.toml"
+    path.write_text(spots_toml(arrays, range(len(arrays)), "a test"), encoding="utf-8")
+    sensors = qpsafe.load_range_sensors(ROBOT, path)
+    rays = zone_rays(arrays.nodes.directions, arrays.sensor.directions)
+    assert tuple(sensor.name for sensor in sensors) == arrays.nodes.names
+    for i, sensor in enumerate(sensors):
+        assert (sensor.mount, sensor.shape) == (arrays.nodes.frames[i], (8, 8))
+        assert (sensor.range_min, sensor.range_max) == (0.02, 4.0)
+        assert sensor.period == pytest.approx(1.0 / 15.0)
+        looks = sensor.directions @ sensor.pose[:3, :3].T
+        assert np.linalg.norm(looks[:, None] - rays[i], axis=2).min(axis=1).max() < 1e-6
+
+
+def test_zones_that_look_at_their_own_link_are_those_whose_rays_meet_it(arrays: Candidates) -> None:
+    """By MuJoCo's rays, which leave from 1 mm above the skin; few are, and no node has many."""
+    model = mujoco.MjModel.from_xml_path(str(ROBOT.model_path))
+    data, hit = mujoco.MjData(model), np.zeros(1, dtype=np.int32)
+    data.qpos[:] = ROBOT.home
+    mujoco.mj_kinematics(model, data)
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    group = np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
+    different = 0
+    for i, frame in enumerate(arrays.nodes.frames):
+        own = model_body(model, ROBOT, frame)
+        model.geom_group[:] = np.where(solid & (model.geom_bodyid == own), 3, 2)
+        T = ROBOT.pose(frame, ROBOT.home)
+        start = T[:3, :3] @ (arrays.nodes.positions[i] + 1e-3 * arrays.nodes.directions[i]) + T[:3, 3]
+        rays = zone_rays(arrays.nodes.directions[i : i + 1], arrays.sensor.directions)[0] @ T[:3, :3].T
+        free = [mujoco.mj_ray(model, data, start, ray, group, 1, -1, hit, None) < 0.0 for ray in rays]
+        different += int((np.array(free) != arrays.free[i]).sum())
+    assert (~arrays.free).mean(axis=1).max() <= BLIND
+    assert (~arrays.free).sum() > 0
+    assert different <= 0.02 * arrays.free.size  # what only decorates hides too, and a ray may pass an edge
+
+
+def test_caps_of_arrays_are_none_but_of_regions_that_take_nothing(arrays: Candidates) -> None:
+    most = arrays.caps(ROBOT).most
+    assert [cap == 0 for cap in most] == [region.at_most == 0 for region in ROBOT.regions]
+    assert set(most.tolist()) == {0, len(arrays)}
+    assert (arrays.links == 0).all()
 
 
 def with_regions(folder: Path, text: str) -> Robot:

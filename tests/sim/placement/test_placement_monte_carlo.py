@@ -12,8 +12,10 @@ import pytest
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
-from qpsafe.placement.candidates import Candidates, candidate_nodes
-from qpsafe.placement.sample import Sample
+from qpsafe.placement.candidates import Candidates, candidate_nodes, node_pose
+from qpsafe.placement.objective import SensorName
+from qpsafe.placement.sample import NEAR, Sample
+from qpsafe.placement.sensors import SENSORS
 from qpsafe.sim.people.anatomy import SEGMENTS
 from qpsafe.sim.placement import cast as placement_cast
 from qpsafe.sim.placement.cast import cast_pairs, pieces
@@ -36,7 +38,7 @@ def world() -> PlacementWorld:
 
 
 def same(a: Sample, b: Sample) -> None:
-    for key in ("first", "node", "danger", "torque", "peak"):
+    for key in ("first", "node", "danger", "torque", "peak", "near"):
         np.testing.assert_array_equal(getattr(a, key), getattr(b, key))
     assert (a.on_robot, a.too_near) == (b.on_robot, b.too_near)
 
@@ -112,6 +114,55 @@ def test_detections_are_what_single_rays_find(nodes: Candidates, world: Placemen
         start = end
     assert found.on_robot == blocked > 0
     assert start > 20
+
+
+@pytest.fixture(scope="module")
+def arrays() -> Candidates:
+    return candidate_nodes(ROBOT, spacing=0.12, sensor=SENSORS[SensorName.vl53l5cx])
+
+
+def test_an_array_detects_what_any_of_its_zones_finds(arrays: Candidates, world: PlacementWorld) -> None:
+    """Every zone's ray is cast by itself, none left out, and a node's most dangerous point counts."""
+    simulation = MonteCarlo(ROBOT, arrays, seed=5)
+    found = cast_pairs(simulation.setup, 0, 0, 3)
+    q, capsules = draw_pairs(world, 5, 0, range(3), simulation.setup.radius)
+    field, seen = qpsafe.DangerField(1.0, 0.0), np.array([1, 1, 0, 1, 0, 0], np.uint8)
+    own, geom, start = world.bodies_of(arrays.nodes), np.full(1, -1, np.int32), 0
+    for p in range(3):
+        nearest, _ = world.nearest(q[p], capsules[p])
+        state = ROBOT.at(q[p])
+        expected = []
+        for i, frame in enumerate(arrays.nodes.frames):
+            T = state.pose(frame) @ node_pose(arrays.nodes.positions[i], arrays.nodes.directions[i])
+            points = []
+            for direction in arrays.sensor.directions[arrays.free[i]] @ T[:3, :3].T:
+                d = mujoco.mj_ray(world.model, world.data, T[:3, 3], direction, seen, 1, int(own[i]), geom)
+                if geom[0] >= 0 and world.model.geom_group[geom[0]] == 1 and 0.02 <= d <= 4.0:
+                    points.append(T[:3, 3] + d * direction)
+            if points:
+                close = np.linalg.norm(np.array(points) - nearest, axis=1).min() <= NEAR
+                expected.append((i, field.value(np.array(points), state.wire(np.zeros(6))).max(), close))
+        end = start + int(found.counts[p])
+        assert found.nodes[start:end].tolist() == [i for i, _, _ in expected]
+        assert found.danger[start:end] == pytest.approx([value for _, value, _ in expected], rel=1e-6)
+        assert found.near[start:end].tolist() == [close for _, _, close in expected]
+        start = end
+    assert 0 < found.near.sum() < len(found.nodes)
+
+
+def test_the_nearest_point_is_as_near_as_any_pair_of_shapes(world: PlacementWorld) -> None:
+    q, capsules = draw_pairs(world, 4, 0, range(6), 1.0)
+    model, segment = world.model, np.empty(6)
+    moving = [g for g in np.flatnonzero(model.geom_group == 3) if model.body_weldid[model.geom_bodyid[g]] != 0]
+    dummy = np.flatnonzero(model.geom_group == 1)
+    for k in range(6):
+        point, distance = world.nearest(q[k], capsules[k])
+        every = [mujoco.mj_geomDistance(model, world.data, g, h, 5.0, segment) for g in moving for h in dummy]
+        assert distance == pytest.approx(min(every), abs=1e-6)
+        axes = capsules[k][:, 1] - capsules[k][:, 0]  # on the dummy's skin
+        share = ((point - capsules[k][:, 0]) * axes).sum(axis=1) / (axes**2).sum(axis=1)
+        foot = capsules[k][:, 0] + np.clip(share, 0.0, 1.0)[:, None] * axes
+        assert np.abs(np.linalg.norm(point - foot, axis=1) - RADII).min() < 1e-5
 
 
 def test_the_torque_is_that_of_the_evasive_motion_alone(nodes: Candidates, world: PlacementWorld) -> None:

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.adapters.vl53l5cx import vl53l5cx
 from qpsafe.ranging.sensor import RangeSensor
-from qpsafe.sim.ranging.depth_camera_model import DepthCameraModel
+from qpsafe.sim.ranging.depth_camera_model import DepthCameraModel, edges
 from qpsafe.sim.ranging.scanner_model import ScannerModel
 from qpsafe.sim.ranging.vl53l5cx_model import Vl53l5cxModel
 from qpsafe.sim.ranging.zones import Ideal, ZoneSensors
@@ -133,6 +133,15 @@ def test_holes_lie_at_edges() -> None:
     edge[4:8, 6:10] = False
     assert (share[~edge] == 0.0).all()
     assert share[edge] == pytest.approx(0.5, abs=0.2)
+
+
+@given(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(0.5, 3.0))
+def test_a_plane_has_no_edges_however_it_is_inclined(across, down, ahead) -> None:
+    """z = ahead / (1 - across x - down y) of the pixels' (x, y, 1)."""
+    x, y = (CAMERA.directions[:, i] / CAMERA.directions[:, 2] for i in (0, 1))
+    z = ahead / (1.0 - across * x - down * y)
+    assert z.min() > 0.0
+    assert not edges(z.reshape(12, 16), 0.05).any()
 
 
 def test_runs_repeat_and_noise_is_of_the_seed(worlds, stage) -> None:
