@@ -93,7 +93,7 @@ def calibrate_camera(
     rough = Views(robot, recording.q, Moving(recording, FEW, seed))
     ways: list[Callable[[], list[Array]]] = [lambda: [np.asarray(guess, dtype=np.float64)]]
     if guess is None:
-        ways = [lambda: first_poses(points, surfaces, rough, seed), lambda: poses_around(points, surfaces, rough)]
+        ways = [lambda: first_poses(points, surfaces, rough, seed), lambda: poses_around(points, surfaces, rough, seed)]
     found: list[tuple[Array, View]] = []
     for begins in ways:
         for begin in begins():

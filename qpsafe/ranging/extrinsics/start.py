@@ -28,7 +28,9 @@ Array = NDArray[np.float64]
 #: registered further.
 TURNS, UPRIGHT, KEPT = 12, 8, 4
 #: Heights above the robot [rad] and directions from which it is looked at where nothing else helps.
-_RISES, _AROUND = (-0.2, 0.1, 0.4, 0.7, 1.1), 24
+_RISES, _AROUND = (-0.3, 0.1, 0.5, 0.9, 1.4), 24
+#: They are judged by nearest points within this first [m], and so many of them are registered.
+_WIDE, _REFINED = 0.5, 32
 #: Within this of what should be read, an image agrees with a rough pose [m].
 _AGREES = 0.15
 #: A part has moved if the robot is not within a distance of it in many other images: this share of the most there are
@@ -57,7 +59,7 @@ def first_poses(
     parts = _moving_parts(surfaces)
     good = [i for i in range(len(points)) if len(points[i]) >= 10 and len(parts[i][0]) >= 10]
     if len(good) < 4:
-        return poses_around(points, surfaces, views)
+        return poses_around(points, surfaces, views, seed)
     seen = np.array([points[i].mean(axis=0) for i in good])
     there = np.array([parts[i][0].mean(axis=0) for i in good])
     pose = _ransac(seen, there, rng)
@@ -78,14 +80,20 @@ def first_poses(
     return [found for _, _, found in tried[:KEPT]]
 
 
-def poses_around(points: Sequence[Array], surfaces: Sequence[tuple[Array, Array]], views: Views) -> list[Array]:
+def poses_around(
+    points: Sequence[Array], surfaces: Sequence[tuple[Array, Array]], views: Views, seed: int = 0
+) -> list[Array]:
     """Poses all around the robot, in which what moves is before it; those that agree best with the images.
 
     Args:
         points: What moves in each image, in the camera's frame (k, 3) [m].
         surfaces: Samples and normals of the robot at each, in its base frame.
         views: The images, to choose by.
+        seed: Of what is chosen at random.
     """
+    rng = np.random.default_rng(seed)
+    few = [x[rng.choice(len(x), size=min(len(x), _FEW // 3), replace=False)] for x in points]
+    rough = Registration(few, [(samples[::16], normals[::16]) for samples, normals in surfaces])
     seen = np.median(np.concatenate(points), axis=0)
     there = np.concatenate([samples for samples, _ in _moving_parts(surfaces)]).mean(axis=0)
     tried = []
@@ -98,9 +106,11 @@ def poses_around(points: Sequence[Array], surfaces: Sequence[tuple[Array, Array]
                 c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[roll]
                 R = pose[:3, :3] @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
                 pose[:3, :3], pose[:3, 3] = R, there - R @ seen
-                tried.append((views.at(pose, _AGREES).wrong, len(tried), pose))
+                tried.append((rough.match(pose, _WIDE).cost, len(tried), pose))
     tried.sort(key=lambda entry: entry[:2])
-    return [pose for _, _, pose in tried[: 2 * KEPT]]
+    better = [(rough.refine(pose, _ROUGH)[0], k) for _, k, pose in tried[:_REFINED]]
+    found = sorted((views.at(pose, _AGREES).wrong, k, pose) for pose, k in better)
+    return [pose for _, _, pose in found[: 2 * KEPT]]
 
 
 def kabsch(seen: Array, there: Array) -> Array:
