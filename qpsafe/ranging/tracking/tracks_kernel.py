@@ -149,3 +149,28 @@ def track(
                         velocities[int(number[i]), c] = left * motions[slot, cluster, c] / speed
     _others(points, here, number, count, reach, velocities)
     return clusters
+
+
+@entry(types.void(readable(2), readable(2), readable(2), _floats, _floats[::1]))
+def swept(points: Array, before: Array, now: Array, dt: float, aside: Array) -> None:
+    """Fill `aside` (p,), see `qpsafe.ranging.tracking.tracks.sweep`."""
+    parallax = 0.0
+    for c in range(3):
+        parallax += (now[c, 3] - before[c, 3]) ** 2
+    parallax = sqrt(parallax)
+    for i in range(points.shape[0]):
+        length, along, square = 0.0, 0.0, 0.0
+        for c in range(3):
+            length += (points[i, c] - now[c, 3]) ** 2
+        length = sqrt(length)
+        for c in range(3):
+            place = before[c, 3]  # on the same ray, then
+            for r in range(3):
+                own = 0.0
+                for k in range(3):
+                    own += now[k, r] * (points[i, k] - now[k, 3])
+                place += before[c, r] * own
+            moved = points[i, c] - place
+            square += moved * moved
+            along += moved * (points[i, c] - now[c, 3]) / length if length > 0.0 else 0.0
+        aside[i] = (sqrt(max(square - along * along, 0.0)) + parallax) / dt
