@@ -15,13 +15,13 @@ from qpsafe.ranging.checks import checked_sensors
 from qpsafe.ranging.configurations import Configurations
 from qpsafe.ranging.inbox import Inbox
 from qpsafe.ranging.judge import Judge
-from qpsafe.ranging.prediction import Foresight
 from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.ranging.reduce import Reducer
 from qpsafe.ranging.rules import OCCUPIED, RangeRules
 from qpsafe.ranging.sensor import WORLD, RangeImage, RangeSensor
+from qpsafe.ranging.tracking.prediction import Foresight
+from qpsafe.ranging.tracking.velocities import MOST, Velocities
 from qpsafe.ranging.unseen import Together
-from qpsafe.ranging.velocities import MOST, Velocities
 from qpsafe.ranging.watch import LATE, SensorWatch
 from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.detection import BadInput
