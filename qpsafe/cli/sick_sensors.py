@@ -35,8 +35,8 @@ def sick_sensors(
 ) -> None:
     """Inject NaN, spikes, stuck, stale, dead sensors in the first experiment and print the matrix of reactions.
 
-    Exit code 1 if a reaction listed in docs/reference/sensing.md is missing or late, a limit is exceeded, or the robot
-    touches something that it would not have touched with healthy sensors.
+    Exit code 1 if a reaction listed in docs/reference (sensing.md, vl53l5cx.md) is missing or late, a limit is
+    exceeded, or the robot touches something that it would not have touched with healthy sensors.
     """
     screen = console(json)
     from qpsafe.robot.loader import load_robot

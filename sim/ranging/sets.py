@@ -108,7 +108,7 @@ def overhead_camera(name: str = "overhead camera") -> RangeSensor:
     least, most = CAMERA_RANGE
     return RangeSensor.camera(
         name, (rows, columns), intrinsics, pose=pose, range_min=least, range_max=most, period=1.0 / 30.0,
-        sigma=0.02, covers=False,
+        sigma=0.02, covers=False, max_age=0.15,  # its latency, and an image that is lost
     )  # fmt: skip
 
 

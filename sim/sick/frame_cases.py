@@ -1,4 +1,4 @@
-"""Sick images: what is wrong with them, and the reaction that docs/reference/sensing.md promises for each case.
+"""Sick images: what is wrong with them, and the reaction that docs/reference/vl53l5cx.md promises for each case.
 
 An image that cannot be used is left out, and said so; what the sensor saw before still counts for as long as its
 `max_age`. Then the sensor does not see: it is named, what it saw last is held as a spot's point is, and a little later
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
+from qpsafe.sensing.health import CLEAR, STOPPED
 from qpsafe.sim.sick import frames
 from qpsafe.sim.sick.cases import BRAKE, WINDOW, Reaction, Window, first_tick
 from qpsafe.sim.sick.frames import Spoil, SpoilsFrames
 
-ONE = 17  # ticks in which a sensor of 15 Hz has one image, or two
+ONE = 17  # ticks in which a sensor of 15 Hz has at least one image
 #: Ticks until a sensor does not see: `max_age`, 0.2 s, since its last good image was taken; and until it is dead.
 DEAD = 58
 
@@ -28,18 +28,23 @@ class FrameCase:
         promise: The reaction.
         within: Ticks it may take.
         share: Share of the sensors that are sick, 0 for a single one.
-        lasts: For how many ticks.
+        images: How many images of each are spoilt; all by default.
+
+    Attributes:
+        lasts: For how many ticks, at most.
     """
 
+    lasts = WINDOW
+
     def __init__(
-        self, name: str, spoil: Spoil, promise: str, within: int, share: float = 0.0, lasts: int = WINDOW
+        self, name: str, spoil: Spoil, promise: str, within: int, share: float = 0.0, images: float = np.inf
     ) -> None:
-        self.name, self.promise, self.within, self.share, self.lasts = name, promise, within, share, lasts
-        self.spoil = spoil
+        self.name, self.promise, self.within, self.share = name, promise, within, share
+        self.spoil, self.images = spoil, images
 
     def frames(self, names: tuple[str, ...]) -> SpoilsFrames:
         """What spoils the images of the sensors of these names."""
-        return SpoilsFrames(names, self.spoil)
+        return SpoilsFrames(names, self.spoil, self.images)
 
     def reaction(self, window: Window) -> Reaction:
         """Whether and when it came."""
@@ -47,12 +52,12 @@ class FrameCase:
 
 
 def _named(window: Window, case: FrameCase) -> Reaction:
-    """Named and capped from some tick on; still so when somebody acknowledges while it lasts."""
+    """Named and capped from some tick on, or stopped if no other sensor is left; also after acknowledging it."""
     names = {window.names[i] for i in window.sick}
     last = window.ticks[-1]
-    if not (names <= {*last.unseen} and last.severity == CAPPED and window.after == CAPPED):
+    if not (names <= {*last.unseen} and last.severity != CLEAR and window.after != CLEAR):
         return Reaction(None)
-    return first_tick(window, lambda record: names <= {*record.unseen} and record.severity == CAPPED)
+    return first_tick(window, lambda record: names <= {*record.unseen} and record.severity != CLEAR)
 
 
 def _frozen(window: Window, case: FrameCase) -> Reaction:
@@ -71,11 +76,13 @@ def _kept(window: Window, case: FrameCase) -> Reaction:
     """Nobody is named, nothing is slowed, and what counted goes on counting."""
     good = all(not record.unseen and record.severity == CLEAR for record in window.ticks)
     seen = window.healthy.cdf_n > 0.0
-    return Reaction(1 if good and all(r.cdf_n > 0.0 or not seen for r in window.ticks[: case.lasts]) else None)
+    return Reaction(1 if good and all(r.cdf_n > 0.0 or not seen for r in window.ticks[:ONE]) else None)
 
 
 def _stopped(window: Window, case: FrameCase) -> Reaction:
-    """At rest for good from some tick on, and stopped until acknowledged."""
+    """At rest for good from some tick on, and stopped until acknowledged; if so many of all sensors are sick."""
+    if len(window.sick) <= window.rules.dead_share * len(window.names) + 1e-9:
+        return Reaction(1, applies=False)
     if window.ticks[-1].severity != STOPPED or window.ticks[-1].status != "bad_input":
         return Reaction(None)
     moving = [k for k, record in enumerate(window.ticks) if np.abs(record.qd).max() > 0.0]
@@ -95,8 +102,8 @@ NAMED, FROZEN, KEPT, STOPS, HARMLESS = (
 REACTIONS = {NAMED: _named, FROZEN: _frozen, KEPT: _kept, STOPS: _stopped, HARMLESS: _harmless}
 
 FRAME_CASES: tuple[FrameCase, ...] = (
-    FrameCase("one image blind", frames.blind, KEPT, 1, lasts=ONE),
-    FrameCase("one image missing", frames.silent, KEPT, 1, lasts=ONE),
+    FrameCase("one image blind", frames.blind, KEPT, 1, images=1),
+    FrameCase("one image missing", frames.silent, KEPT, 1, images=1),
     FrameCase("blind in all zones, for good", frames.blind, NAMED, DEAD),
     FrameCase("not a number in all zones, for good", frames.no_numbers, NAMED, DEAD),
     FrameCase("minus infinity in a zone, for good", frames.negative, NAMED, DEAD),

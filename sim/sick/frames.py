@@ -101,10 +101,11 @@ class SpoilsFrames:
     Args:
         names: Of the sensors.
         spoil: What is wrong with them.
+        count: How many images of each are spoilt.
     """
 
-    def __init__(self, names: Collection[str], spoil: Spoil) -> None:
-        self._names, self._spoil = frozenset(names), spoil
+    def __init__(self, names: Collection[str], spoil: Spoil, count: float = np.inf) -> None:
+        self._names, self._spoil, self._left = frozenset(names), spoil, dict.fromkeys(names, count)
         self._first: dict[str, RangeImage] = {}
 
     def __call__(self, images: list[RangeImage]) -> list[RangeImage]:
@@ -112,7 +113,8 @@ class SpoilsFrames:
         passed = []
         for image in images:
             name = image.sensor.name
-            if name in self._names:
+            if name in self._names and self._left[name] > 0:
+                self._left[name] -= 1
                 spoilt = self._spoil(image, self._first.setdefault(name, image))
                 passed += [] if spoilt is None else [spoilt]
             else:

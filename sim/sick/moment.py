@@ -123,14 +123,15 @@ def _play(loop: FixedLoop, sick: Numbers, before: Array, case: Case | FrameCase 
 
 
 def _where(loop: FixedLoop, moment: Moment, sick: Numbers, before: Array) -> Array | None:
-    """What has to move if the first sick sensor's readings must: a spot's point, or the pose of a range sensor."""
+    """What moves if the first sick sensor's readings must change: a spot's point, or the pose of a range sensor."""
     sensing, ranging = loop.controller.sensing, loop.controller.ranging
     if not len(sick):
         return None
     name = loop.sensor_names[sick[0]]
     if ranging is not None and name in (sensor.name for sensor in ranging.sensors):
         sensor = next(sensor for sensor in ranging.sensors if sensor.name == name)
-        return sensor.pose if sensor.mount == "world" else moment.state.pose(sensor.mount) @ sensor.pose
+        fixed = sensor.mount == "world"  # then the robot before it
+        return moment.state.body_poses() if fixed else moment.state.pose(sensor.mount) @ sensor.pose
     if sensing is None or not np.isfinite(before[sick[0]]):
         return None
     spots = before[: len(sensing.spots)]
