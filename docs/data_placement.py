@@ -75,9 +75,10 @@ def misses(sets: Mapping[str, SpotArray], trials: int = TRIALS) -> tuple[dict[st
             parts.append(names[segment] if segment < len(names) else "board")
             for name, reader in readers.items():
                 distances, hits = reader.read(poses, people)
-                of_people = hits >= len(met.station.world.names)
-                points = detected_points(*rays_in_world(poses, *mounts[name]), np.where(of_people, distances, np.inf))
-                away = np.linalg.norm(points[of_people] - near.on_person[k], axis=1)
+                seen = hits >= len(met.station.world.names)
+                origins, directions = rays_in_world(poses, *mounts[name])
+                points = detected_points(origins[seen], directions[seen], distances[seen])
+                away = np.linalg.norm(points - near.on_person[k], axis=1)
                 found[name].append(float(away.min(initial=np.inf)))
     return {name: np.array(values) for name, values in found.items()}, parts
 
