@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -13,39 +12,24 @@ from qpsafe.sim.campaign.report.markdown import filled
 DOCS = Path(__file__).resolve().parent
 sys.path.append(str(DOCS))
 
+import bench_tables  # noqa: E402
 import demo_tables  # noqa: E402
+import ranging_tables  # noqa: E402
+from noted import measured  # noqa: E402
 
-#: Pages, and the campaign each is filled from.
+#: Pages with tables, and the campaign each is filled from.
 PAGES = {
-    DOCS / "explanation" / "campaign.md": "campaign",
-    DOCS.parent / "README.md": "campaign",
-    DOCS / "explanation" / "verified-motion.md": "verified",
-    DOCS / "how-to" / "coming-from.md": "campaign",
-    DOCS / "how-to" / "placement.md": "campaign",
-    DOCS / "explanation" / "demo-fixed.md": "campaign",
-    DOCS / "explanation" / "demo-path.md": "campaign",
-    DOCS / "explanation" / "demo-pick-and-place.md": "campaign",
-    DOCS / "explanation" / "compare.md": "campaign",
-    DOCS / "explanation" / "hierarchical-qp.md": "campaign",
-    DOCS / "explanation" / "one-tick.md": "campaign",
-    DOCS / "how-to" / "stories.md": "campaign",
-    DOCS / "how-to" / "stream.md": "campaign",
-    DOCS / "how-to" / "tune.md": "campaign",
+    page: "verified" if page.stem == "verified-motion" else "campaign"
+    for page in sorted((DOCS.parent / "README.md", *DOCS.rglob("*.md")))
+    if ": end -->" in page.read_text(encoding="utf-8")
 }
-DATA = DOCS / "data" / "campaign.json"
-
-
-def committed(name: str = "campaign") -> Any:
-    """What docs/data/NAME.json says; None if there is none yet."""
-    file = DOCS / "data" / f"{name}.json"
-    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
 
 
 def worst() -> str:
     """What the searches for the worst have found, a line a controller."""
     head = "| controller | trials | near, searched | near, random | worst harm, searched | worst harm, random | new |"
     rows = [head, "| --- | --- | --- | --- | --- | --- | --- |"]
-    for name, found in committed("worst").items():
+    for name, found in measured("worst").items():
         rows.append(
             f"| `{name}` | 2 x {found['budget']} | {found['searched']} | {found['random']} | {found['worst']:.2f} "
             f"| {found['worst_random']:.2f} | {found['new']} |"
@@ -55,7 +39,7 @@ def worst() -> str:
 
 def engine() -> str:
     """How near the engine is to MuJoCo, and how fast, in a table."""
-    near, fast = committed("engine"), committed("speed")
+    near, fast = measured("engine"), measured("speed")
     rows = [
         ("encounters, ticks compared", f"{near['trials']}, {near['compared']:,}"),
         ("readings that both have", f"{near['hits']:,}"),
@@ -73,7 +57,7 @@ def engine() -> str:
 
 def peers() -> str:
     """What becomes of the same troubles in other libraries and here, a line a trouble."""
-    found = committed("peers")
+    found = measured("peers")
     names = ("mink", "pink", "pink, `AccelerationLimit`", "placo", "qpsafe")
 
     def told(trouble: str, run: dict[str, Any]) -> str:
@@ -115,7 +99,7 @@ def peers() -> str:
 
 def approaches() -> list[tuple[dict[str, Any], dict[str, Any], dict[str, Any]]]:
     """Of each approach of the first experiment: its distances, its medium danger before high, its high danger."""
-    found = committed("fixed")
+    found = measured("fixed")
     regimes = found["regimes"]
     told = []
     for approach in found["approaches"]:
@@ -135,7 +119,7 @@ def distances() -> list[str]:
 def fixed() -> str:
     """The first experiment, a column an approach."""
     found = approaches()
-    kept = [check["kept"] for check in committed("fixed")["checks"] if check["name"].startswith("order of Table I")]
+    kept = [check["kept"] for check in measured("fixed")["checks"] if check["name"].startswith("order of Table I")]
     rows = {
         "low, medium, high and back, one at a time": ["yes" if good else "no" for good in kept],
         "largest CDF_n (held points included, see below)": [f"{high['cdf_n']:.1f}" for *_, high in found],
@@ -159,17 +143,17 @@ def gained() -> str:
 
 def judged() -> str:
     """The default controller on encounters that nothing was chosen by, a line a sensor; and beside the plain stop."""
-    found = {f"default, {name}": committed(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
+    found = {f"default, {name}": measured(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
     alone = {"controllers": found, "references": []}
     tables = []
     for measures, summary in (
         ("contacts, moving, towards, over_limit, unseen, furniture, self", alone),
         ("distance_median, energy_mean, lost_time_mean, suspensions_mean, reversals_mean", alone),
-        ("less stop: contacts, moving, towards, over_limit, energy_mean, lost_time_mean", committed("judged-stop")),
+        ("less stop: contacts, moving, towards, over_limit, energy_mean, lost_time_mean", measured("judged-stop")),
     ):
         lines = filled(f"<!-- campaign: {measures} -->\n<!-- campaign: end -->", summary).splitlines()
         tables.append("\n".join(lines[2:-2]))
-    paired = committed("judged-stop")["trials"]["finished"]
+    paired = measured("judged-stop")["trials"]["finished"]
     tables.insert(2, f"The difference to `stop`, ideal sensors, in the first {paired:,} of these, trial by trial:")
     return "\n\n".join(tables)
 
@@ -178,7 +162,7 @@ def tuned() -> str:
     """What came of each run of `qpsafe tune`, judged on encounters that nothing was tuned on."""
     heads = ("robot", "search", "tried, all encounters", "processor time [s]", "judged on", "harm", "work lost [s]")
     rows = [f"| {' | '.join((*heads, 'contacts', 'furniture, self'))} |", "|" + " --- |" * 9]
-    for run in committed("tune")["runs"]:
+    for run in measured("tune")["runs"]:
         judged, search = run["judgement"], run["search"]
         name, tried = f"`{run['robot']}`", f"{run['tried']}, {run['whole']} | {search['processor_s']:.0f}"
         if judged is None:
@@ -198,7 +182,7 @@ def tuned() -> str:
 
 def tuned_values() -> str:
     """Present and chosen values of the first run."""
-    run = committed("tune")["runs"][0]
+    run = measured("tune")["runs"][0]
     rows = ["| parameter | present | chosen |", "| --- | --- | --- |"]
     for table, keys in run["present"]["values"].items():
         for key, value in keys.items():
@@ -218,6 +202,8 @@ TABLES = {
     "fixed": fixed,
     "gained": gained,
     **demo_tables.TABLES,
+    **bench_tables.TABLES,
+    **ranging_tables.TABLES,
 }
 
 
@@ -228,7 +214,7 @@ def made(text: str, campaign: str = "campaign") -> str:
         text: Of the page.
         campaign: Name of the file in docs/data.
     """
-    text = filled(text, committed(campaign))
+    text = filled(text, measured(campaign))
     for mark, table in TABLES.items():
         pattern = re.compile(rf"<!-- {mark} -->\n.*?<!-- {mark}: end -->", re.DOTALL)
         text = pattern.sub(lambda _, m=mark, t=table: f"<!-- {m} -->\n\n{t()}\n\n<!-- {m}: end -->", text)

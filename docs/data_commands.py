@@ -11,15 +11,19 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
-
-from qpsafe.text.json_text import json_text
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT / "docs" / "data"
+sys.path.append(str(ROOT / "docs"))
+
+from noted import note  # noqa: E402
+
 #: What is run; {out} stands for a file or folder that is not kept. A program of benchmarks/ writes the JSON there.
 COMMANDS = {
     "fixed": "demo fixed --json --no-video --out {out}",
+    "fixed-paper": "demo fixed --projection paper --json --no-video --out {out}",
+    "fixed-weighted": "demo fixed --law weighted --json --no-video --out {out}",
+    "fixed-nullspace": "demo fixed --law nullspace --json --no-video --out {out}",
+    "robots": "demo fixed --robot all --json --no-video --out {out}",
     "path": "demo path --json --out {out}",
     "fast-person": "demo fast-person --json --out {out}",
     "pick": "demo pick-and-place --seeds 10 --jobs 1 --json --out {out}",
@@ -29,7 +33,18 @@ COMMANDS = {
     "place-caps": "place --no-exact --json --no-pictures --out {out}",
     "place-arrays": "place --sensor vl53l5cx --objective nearest --no-exact --json --no-pictures --out {out}",
     "ticks": "bench --json",
+    "compilation": "bench --compile --json",
+    "gate": "benchmarks/bench_gate.py {out}",
+    "separation": "benchmarks/bench_separation.py {out}",
+    "clearance": "benchmarks/clearance_runs.py {out}",
+    "projection": "benchmarks/projection_residuals.py {out}",
+    "walkers": "benchmarks/walkers_seen.py {out}",
+    "stumbles": "benchmarks/stumbling_hands.py {out}",
+    "gym": "benchmarks/bench_gym.py {out}",
+    "plugin-ticks": "benchmarks/bench_plugins.py {out}",
+    "other-robots": "benchmarks/other_robots.py {out}",
     "irc5-faults": "irc5-faults --moments 20 --jobs 1 --json",
+    "camera-calibration": "benchmarks/camera_calibration.py --out {out}",
     "hqp-solvers": "benchmarks/bench_hqp.py --out {out}",
     "hqp-intervals": "benchmarks/hqp_intervals.py --count 20000 --seed 21 --json",
     "stream": "benchmarks/bench_stream.py --duration 60 --busy 0 2 --real-time yes --out {out}",
@@ -37,15 +52,6 @@ COMMANDS = {
 }
 #: What no page needs of them.
 DROPPED = {"place-share": ("curves",), "place-caps": ("curves",)}
-
-
-def rounded(value: Any) -> Any:
-    """The same with six significant digits: pages show fewer."""
-    if isinstance(value, float):
-        return float(f"{value:.6g}")
-    if isinstance(value, dict):
-        return {key: rounded(item) for key, item in value.items()}
-    return [rounded(item) for item in value] if isinstance(value, list) else value
 
 
 def main(names: list[str]) -> None:
@@ -57,12 +63,12 @@ def main(names: list[str]) -> None:
             program = words if words[0].endswith(".py") else ["-m", "qpsafe", *words]
             done = subprocess.run([sys.executable, *program], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
             text = out.read_text(encoding="utf-8") if out.is_file() else done.stdout
-        found = rounded(json.loads(text))
+        found = json.loads(text)
         for key in DROPPED.get(name, ()):
             del found[key]
         if isinstance(found, dict):
             found.get("machine", {}).pop("system", None)  # the kernel's build says nothing to others
-        (DATA / f"{name}.json").write_text(json_text(found, indent=1) + "\n", encoding="utf-8")
+        note(name, found)
         print(f"{name}: exit code {done.returncode}", flush=True)
 
 

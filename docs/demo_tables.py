@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from statistics import median
 from typing import Any
 
-DATA = Path(__file__).resolve().parent / "data"
-
-
-def measured(name: str) -> Any:
-    """What docs/data/NAME.json says."""
-    return json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+from noted import measured
 
 
 def lines(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -105,104 +98,40 @@ def pick() -> str:
     return lines(("", "nobody", "seed 0", f"seeds 0 to {len(runs) - 1}"), rows)
 
 
-def compare() -> str:
-    """How near the paper's law and its QP form are."""
-    found = measured("compare")
-    states, loop = found["states"], found["closed_loop"]
-    count = f"{found['sample']['states']:,}"
-    rows = []
-    for what, name in (
-        (f"{count} random states, no limits [rad/s]", "paper"),
-        ("the same with inactive limits [rad/s]", "paper, limits inactive"),
-    ):
-        kinds = states[name].values()
-        middle = [kind["median"] for kind in kinds]
-        rows.append((what, f"{max(k['worst'] for k in kinds):.1e}", f"{min(middle):.1e} to {max(middle):.1e}"))
-    long = f"joint trajectories over {loop['duration']:.0f} s, limits off [rad]"
-    rows.append((long, f"{loop['trajectory_deviation']:.1e}", ""))
-    return lines(("", "worst", "median of each of the 18 kinds"), rows)
-
-
-def place() -> str:
-    """Twenty spots by each objective, judged on pairs that they were not chosen for."""
-    names = {"cost": "`cost`, (10) to (12)"}
-    rows = []
-    for name, found in measured("place")["placements"].items():
-        fair, own = found["independent_sample"], found["optimised_sample"]
-        rows.append(
-            (
-                names.get(name, f"`{name}`, {found['method']}"),
-                f"{fair['probability']:.1%} ({own['probability']:.1%})".replace("%", " %"),
-                f"{100 * fair['low']:.1f} to {100 * fair['high']:.1f}",
-                f"{100 * fair['danger']:.0f} %",
-            )
-        )
-    return lines(("20 spots by", "detected", "95 %", "danger measured"), [*rows, ("the paper", "89 %", "", "")])
-
-
-def bench() -> str:
-    """What a tick takes, and of mink's."""
-    tick = "whole tick, 20 distances"
-    mink, pink = (f"{name}.solve_ik + daqp: frame, posture, limits" for name in ("mink", "pink"))
-    names = {
-        tick: f"{tick}: what a robot with its own sensors runs",
-        f"{tick}, garbage collector on": "the same, garbage collector on",
-        f"{tick}, collector on after gc.freeze": "the same after `gc.freeze`",
-        "whole tick, 20 points given": "whole tick, 20 points given instead",
-        f"{tick}, a task of one's own": f"{tick}, the position task somebody's own",
-        f"{tick}, paper's projection": "the paper's projection",
-        f"{tick}, weighted law": "the weighted law",
-        f"{tick}, null-space law": "the null-space law, clipped in high danger, which is said",
-        "danger field, 20 points x 6 links": "of it: danger field",
-        "sensing, 20 spots, all filters": "of it: sensing",
-        mink: "`mink.solve_ik` with daqp: frame, posture, limits",
-        pink: "`pink.solve_ik`, the same",
+def barrier() -> str:
+    """What a cap on danger changes, a column a cap."""
+    found = measured("barrier")
+    rows = {
+        "largest CDF_n": lambda f: f"{f['danger']:.1f}",
+        "the same while the board stands still before the robot": lambda f: f"{f['danger_in_pause']:.2f}",
+        "smallest distance robot-board": lambda f: f"{f['distance']:.3f} m",
+        "largest norm of q̇": lambda f: f"{f['speed']:.1f} rad/s",
     }
-    found = measured("ticks")["results"]
+    heads = ["", *("no cap" if cap == "none" else f"Δ_max = {cap}" for cap in found)]
+    return lines(heads, [(what, *(show(f) for f in found.values())) for what, show in rows.items()])
+
+
+def robots() -> str:
+    """The first experiment, a line a robot."""
+    heads = ("robot", "joints", "wire links", "regimes in order", "largest CDF_n", "limits held")
+    heads += ("distance to the board gained: front, left, right", "kept")
     rows = []
-    for name, what in names.items():
-        row = found[name]
-        spread = "" if name == mink else f" ({row['ratio_low']:.2f} to {row['ratio_high']:.2f})"
-        rows.append((what, f"{1e6 * row['median']:.3g}", f"{row['ratio']:.2f}{spread}"))
-    return lines(("what", "median [µs]", "of mink (quartiles)"), rows)
+    for row in measured("robots"):
+        gained = ", ".join(f"{1e3 * metres:.0f}" for metres in row["gained"])
+        limits, kept = ("yes" if row[key] else "no" for key in ("limits_held", "kept"))
+        cells = (str(row["joints"]), str(row["links"]), "{} of {}".format(*row["in_order"]))
+        rows.append((f"`{row['robot']}`", *cells, f"{row['peak']:.1f}", limits, f"{gained} mm", kept))
+    return lines(heads, rows)
 
 
-HQP = ("solver", "median µs", "p99", "best max", "wrong", "worse", "bad", "not repeated", "largest error")
+def walkers() -> str:
+    """How soon a walker is in high danger, a line a speed."""
+    rows = [
+        (f"{speed} m/s", f"{found['at_rest']:.3f} s", f"{found['estimate']:.3f} s")
+        for speed, found in measured("walkers")["walkers"].items()
+    ]
+    return lines(("walking", "at rest, as in the paper", "with the estimate"), rows)
 
 
-def _solvers(rows: list[dict[str, Any]]) -> str:
-    keys = (("median_us", ".1f"), ("p99_us", ".1f"), ("best_max_us", ".0f"), ("wrong", "d"), ("worse", "d"))
-    keys += (("bad_status", "d"), ("not_repeated", "d"), ("largest_error", ".0e"))
-    return lines(HQP, [(row["solver"], *(format(row[key], form) for key, form in keys)) for row in rows])
-
-
-def hqp_random() -> str:
-    """Hierarchical solvers on random problems."""
-    return _solvers(measured("hqp-solvers")["random"])
-
-
-def hqp_drift() -> str:
-    """The same on a drifting sequence."""
-    return _solvers(measured("hqp-solvers")["drift"])
-
-
-def late() -> str:
-    """How late answers are, a line a run."""
-    rows = []
-    for run in measured("stream")["results"]:
-        stream, response = run["stream"], run["stream"]["response"]
-        parts = stream["missed_parts"]
-        rows.append(
-            (
-                str(run["busy"]),
-                f"{stream['answered_in_time']} of {stream['packets']}",
-                *(str(count) for count in parts.values()),
-                *(f"{1e3 * response[key]:.2f} ms" for key in ("p50", "p99", "p99.9", "maximum")),
-            )
-        )
-    names = [str(name).replace("_", " ") for name in measured("stream")["results"][0]["stream"]["missed_parts"]]
-    return lines(("busy processes", "in time", *names, "p50", "p99", "p99.9", "maximum"), rows)
-
-
-TABLES = {"path": path, "fast-person": fast_person, "pick": pick, "compare": compare, "place": place, "bench": bench}
-TABLES |= {"hqp-random": hqp_random, "hqp-drift": hqp_drift, "late": late}
+TABLES: dict[str, Callable[[], str]] = {"path": path, "fast-person": fast_person, "pick": pick}
+TABLES |= {"barrier": barrier, "robots": robots, "walkers": walkers}

@@ -1,4 +1,7 @@
-"""Draw the figures of the documentation: ``python docs/figures.py [NAME ...]`` writes docs/img/NAME.png."""
+"""Draw the figures of the documentation: ``python docs/figures.py [NAME ...]`` writes docs/img/NAME.png.
+
+What the pages say of them goes into docs/data/NAME.json.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import BoundaryNorm
+from noted import note
 
 import qpsafe
 from qpsafe.danger.activation import regime_weights
@@ -65,7 +69,7 @@ def danger_field() -> plt.Figure:
         axis.set(title=title, xlabel="x [m]", aspect="equal")
         axis.grid(False)
     axes[0].set_ylabel("z [m]")
-    bar = figure.colorbar(filled, ax=axes, label="CDF", ticks=levels, shrink=0.95)
+    bar = figure.colorbar(filled, ax=axes, label="CDF [1/m]", ticks=levels, shrink=0.95)
     bar.ax.minorticks_off()
     return figure
 
@@ -81,12 +85,12 @@ def laws() -> plt.Figure:
     upper.plot(danger, m, color=RED, label="m, position task (19)")
     upper.plot(danger, f, color=BLUE, linestyle="--", label="f, orientation task (21)")
     upper.set(ylabel="switch", ylim=(-0.05, 1.35), yticks=(0.0, 0.5, 1.0))
-    upper.legend(loc="upper right", ncols=2)
+    upper.legend(loc="upper right", ncols=2, frameon=True, facecolor="white", edgecolor="none", framealpha=1.0)
     names = ("high danger: evasion", "medium: position, evasion", "low: position, orientation, evasion")
     lower.stackplot(danger, weights[::-1], colors=(LOW, MEDIUM, HIGH), edgecolor=GREY, linewidth=0.5)
     for name, place in zip(names, (13.9, 9.6, 5.1), strict=True):
         lower.text(place, 0.5, name.replace(": ", ":\n").replace(", ", ",\n"), ha="center", va="center", fontsize=8)
-    lower.set(ylabel="weight of the regime", xlabel="CDF$_n$", ylim=(0.0, 1.0), xlim=(danger[0], danger[-1]))
+    lower.set(ylabel="weight of the regime", xlabel="CDF$_n$ [1/m]", ylim=(0.0, 1.0), xlim=(danger[0], danger[-1]))
     edges = [edge for threshold in activation.thresholds[::-1] for edge in (threshold.start, threshold.end)]
     sides = ("center", "right", "left", "center")
     texts = ("Δ$_f$(1-ε$_f$)", "Δ$_f$(1+ε$_f$)", "Δ(1-ε)", "Δ(1+ε)")
@@ -116,6 +120,8 @@ def limits() -> plt.Figure:
             log.append((s, (v - new) / (a * dt)))
             s, v = s - new * dt, new
         curves[name] = np.array(log)
+    _, late, hard = curves.values()
+    note("limits", {"beyond": -late[:, 0].min(), "deceleration": hard[:, 1].max()})
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.2))
     time = 1e3 * dt * (np.arange(300) - np.argmax(curves["stopping speed of the box"][:, 0] < 1e-9))
@@ -144,6 +150,9 @@ def controller() -> plt.Figure:
         ticks.append(control.step(q, qd, points=[here.pose[:3, 3] + [gap, 0.0, 0.1]]))
         q, qd = ticks[-1].reference.q, ticks[-1].reference.qd
     time = np.array([tick.reference.time for tick in ticks])
+    phases = [tick.phase for tick in ticks]
+    changes = [k for k in range(1, len(ticks)) if phases[k] != phases[k - 1]]
+    note("controller", {"phases": [{"time": time[k], "phase": phases[k]} for k in changes]})
 
     figure, axes = plt.subplots(3, 1, figsize=(7.0, 6.0), sharex=True)
     regimes = [tick.regime for tick in ticks]
@@ -156,7 +165,7 @@ def controller() -> plt.Figure:
     axes[0].plot(time, [tick.cdf_n for tick in ticks], color="black")
     for threshold, dash in zip(control.activation.thresholds, ("-", "--"), strict=True):
         axes[0].axhline(threshold.start, color=GREY, linestyle=dash, linewidth=0.8)
-    axes[0].set(ylabel="CDF$_n$", ylim=(4.0, 16.0))
+    axes[0].set(ylabel="CDF$_n$ [1/m]", ylim=(4.0, 16.0))
     axes[1].plot(time, [tick.activations[0] for tick in ticks], color=RED, label="a$_1$ = m")
     axes[1].plot(time, [tick.activations[1] for tick in ticks], color=BLUE, linestyle="--", label="a$_2$ = m f")
     axes[1].set(ylabel="activation", ylim=(-0.08, 1.08))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
+
+from noted import measured
 
 import qpsafe
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
@@ -28,7 +29,7 @@ def main() -> None:
     run = experiment.run()
     timeline(run, [person.name for person in experiment.people], IMG / "demo-pick-time.png")
     draw(experiment, run, IMG / "demo-pick-snapshots.png")
-    found = json.loads((DOCS / "data" / "pick.json").read_text(encoding="utf-8"))
+    found = measured("pick")
     alone, runs = figures_of(found["without_people"]), [figures_of(run) for run in found["runs"]]
     seeds_figure(runs, alone, IMG / "demo-pick-seeds.png")
 

@@ -1,4 +1,4 @@
-"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as it is shipped, its pictures, and arrays beside spots.
+"""Draw docs/img/placement-*.png: `qpsafe place` for the IRB 140 as shipped, its pictures, and arrays beside spots.
 
 The last is drawn from docs/data/place.json and place-arrays.json.
 """
@@ -41,27 +41,31 @@ LOOKS = {
 
 
 def arrays_beside_spots() -> None:
-    """Who is detected, of whom the nearest part is seen, and what of the danger, by how many sensors of either kind."""
+    """Detection, cost, danger measured and nearest part seen as in Fig. 9, by how many sensors of either kind."""
     import matplotlib.pyplot as plt
 
-    panels = (("detected", "probability", "confidence"), ("nearest part seen", "nearest", "nearest_confidence"))
     with matplotlib.rc_context(STYLE):
-        figure, axes = plt.subplots(1, 3, figsize=(10.0, 3.6), sharey=True, layout="constrained")
+        figure, axes = plt.subplots(2, 2, figsize=(8.4, 6.4), sharex=True, layout="constrained")
+        seen, near, danger, cost = axes.ravel()
         for (name, objective), (label, colour, style) in LOOKS.items():
             text = (DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")
             curve = json.loads(text)["curves"][objective]
             k = np.arange(MOST + 1)
-            for axis, (_, share, limits) in zip(axes, panels, strict=False):
+            for axis, share, limits in ((seen, "probability", "confidence"), (near, "nearest", "nearest_confidence")):
                 low, high = np.array(curve[limits])[:, : MOST + 1]
                 axis.fill_between(k, low, high, color=colour, alpha=0.2, linewidth=0)
                 axis.plot(k, curve[share][1][: MOST + 1], style, color=colour, label=label)
-            axes[2].plot(k, curve["danger"][1][: MOST + 1], style, color=colour, label=label)
-        for axis, title in zip(axes, (*(panel[0] for panel in panels), "danger measured, of max SDF"), strict=True):
+            for axis, what in ((danger, "danger"), (cost, "cost")):
+                axis.plot(k, curve[what][1][: MOST + 1], style, color=colour)
+        titles = ("detected", "nearest part seen", "danger measured, of max SDF", "cost (11) per pair and node [1/m]")
+        for axis, title in zip(axes.ravel(), titles, strict=True):
             axis.set_title(title)
-            axis.set_xlabel("number of sensors")
             axis.set_xlim(0, MOST)
-            axis.set_ylim(0.0, 1.02)
-        axes[0].legend(loc="lower right", fontsize=8)
+            if axis is not cost:
+                axis.set_ylim(0.0, 1.02)
+        for axis in axes[1]:
+            axis.set_xlabel("number of sensors")
+        seen.legend(loc="lower right", fontsize=8)
         save(figure, IMG / "placement-arrays.png")
         plt.close(figure)
 

@@ -1,6 +1,10 @@
-"""Draw docs/img/plugins.png and outside.png: mink alone and with qpsafe's tasks and limits."""
+"""Draw docs/img/plugins.png and outside.png: mink alone and with qpsafe's tasks and limits.
+
+What the pages say of them goes into docs/data/plugins.json.
+"""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import mink
@@ -9,6 +13,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
+from noted import note
 
 import qpsafe
 from qpsafe.plugins.mink import DangerLimit, DangerMonitor, EvasiveTask, JointLimit
@@ -41,17 +46,15 @@ def swing(evade: bool, duration: float = 14.0) -> np.ndarray:
     return np.array(rows).T
 
 
-def draw_swing() -> None:
+def draw_swing() -> dict[str, Any]:
     """Both loops over time."""
+    found = {}
     figure, axes = plt.subplots(3, 1, figsize=(7.2, 6.2), sharex=True, layout="constrained")
     for (label, (colour, style)), evade in zip(STYLES.items(), (False, True), strict=True):
         t, gap, off, danger, speed = swing(evade)
         for axis, values in zip(axes, (gap, 1e3 * off, danger), strict=True):
             axis.plot(t, values, color=colour, linestyle=style, label=label)
-        print(
-            f"{label}: nearest {gap.min():.3f} m, largest danger {danger.max():.1f}, largest tool error "
-            f"{1e3 * off.max():.0f} mm, {1e3 * off[-1]:.0f} mm at the end, largest joint speed {speed.max():.2f} rad/s"
-        )
+        found[label] = {"distance": gap.min(), "danger": danger.max(), "speed": speed.max(), "error_at_end": off[-1]}
     for axis, label in zip(axes, ("hand to tool [m]", "tool off target [mm]", "CDF$_n$ [1/m]"), strict=True):
         axis.set_ylabel(label)
         axis.set_ylim(0.0, None)
@@ -59,6 +62,7 @@ def draw_swing() -> None:
     axes[2].set_xlabel("time [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     figure.savefig(HERE / "plugins.png", dpi=160)
+    return found
 
 
 def back(excess: float) -> tuple[np.ndarray, np.ndarray]:
@@ -91,8 +95,9 @@ def mink_raises(excess: float) -> bool:
     return False
 
 
-def draw_outside() -> None:
+def draw_outside() -> dict[str, Any]:
     """Ways back inside from several starts; crosses where mink's own limits raise."""
+    found = {}
     figure, axes = plt.subplots(2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained")
     for excess, colour in ((0.05, "#0b5fa5"), (0.02, "#2e8b57"), (0.01, "#8a5a00")):
         beyond, speed = back(excess)
@@ -101,10 +106,12 @@ def draw_outside() -> None:
         axes[1].plot(t, speed, color=colour)
         if raises:
             axes[0].plot(0.0, 1e3 * excess, "x", color="#c0392b", markersize=9, markeredgewidth=2, clip_on=False)
-        inside = t[np.argmax(beyond <= 1e-9)]
-        print(
-            f"{excess} rad outside: mink raises {raises}; inside after {inside:.2f} s, at most {-speed.min():.3f} rad/s"
-        )
+        found[f"{excess}"] = {
+            "mink_raises": raises,
+            "inside_after": t[np.argmax(beyond <= 1e-9)],
+            "speed": np.abs(speed).max(),
+            "acceleration": np.abs(np.diff(speed)).max() / DT,
+        }
     axes[0].plot(
         [], [], "x", color="#c0392b", markersize=9, markeredgewidth=2, label="mink's own limits: NoSolutionFound"
     )
@@ -117,8 +124,8 @@ def draw_outside() -> None:
         axis.grid(color="#d0d0d0", linewidth=0.5)
     axes[0].legend(loc="upper right")
     figure.savefig(HERE / "outside.png", dpi=160)
+    return found
 
 
 if __name__ == "__main__":
-    draw_swing()
-    draw_outside()
+    note("plugins", {"swing": draw_swing(), "outside": draw_outside()})

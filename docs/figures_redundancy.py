@@ -1,4 +1,7 @@
-"""Draw docs/img/redundancy.png: the elbow of a seven-joint arm makes way in its null space, the tool stays."""
+"""Draw docs/img/redundancy.png: the elbow of a seven-joint arm makes way in its null space, the tool stays.
+
+What the page says of it goes into docs/data/redundancy.json.
+"""
 
 from pathlib import Path
 
@@ -7,6 +10,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
+from noted import note
 
 import qpsafe
 
@@ -67,14 +71,18 @@ def main() -> None:
     for axis in (left, upper, lower):
         axis.grid(color="#d0d0d0", linewidth=0.5)
     figure.savefig(HERE / "redundancy.png", dpi=160)
-    for damping in (2.0, 20.0):
-        log = run(damping)
-        print(
-            f"damping {damping:g}: elbow {log['rest'][-1]:.3f} m from the person at rest, "
-            f"{log['elbow'][-1]:.3f} m at the end; "
-            f"tool off by at most {1e3 * log['position'].max():.4f} mm and {log['orientation'].max():.1e} rad; "
-            f"danger {log['cdf_n'].max():.2f} to {log['cdf_n'][-1]:.2f}"
-        )
+    note("redundancy", {f"{damping:g}": figures(run(damping)) for damping in (2.0, 20.0)})
+
+
+def figures(log: dict[str, np.ndarray]) -> dict[str, float]:
+    """What the page says of a run."""
+    return {
+        "distance": log["elbow"][-1],
+        "gained": log["elbow"][-1] - log["rest"][-1],
+        "position": log["position"].max(),
+        "orientation": log["orientation"].max(),
+        "danger": log["cdf_n"].max(),
+    }
 
 
 if __name__ == "__main__":

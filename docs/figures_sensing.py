@@ -1,4 +1,7 @@
-"""Draw the figures of docs/reference/sensing.md: ``python docs/figures_sensing.py`` writes docs/img/sensing-*.png."""
+"""Draw the figures of docs/reference/sensing.md: ``python docs/figures_sensing.py`` writes docs/img/sensing-*.png.
+
+What the pages say of them goes into docs/data/sensing.json.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from noted import note
 
 import qpsafe
 from qpsafe.sensing.calibration_plot import calibration_figure
@@ -17,6 +21,7 @@ from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sharp import PEAK, SharpConverter, SharpCurve
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
+FOUND: dict[str, float] = {}
 IMG = Path(__file__).resolve().parent / "img"
 BLUE, RED, GREY, GREEN = "#0b5fa5", "#c0392b", "#777777", "#2a8c3c"
 STYLE = {
@@ -75,7 +80,7 @@ def calibration() -> plt.Figure:
     share = float((np.abs(e) <= 0.01).mean())
     right.set_title(f"live samples (grey): {100 * share:.2f} % within 1 cm")
     right.set_ylim(-1.8, 1.8)
-    print(f"live samples: {100 * share:.2f} % within 1 cm, 95 % within {100 * np.percentile(np.abs(e), 95):.2f} cm")
+    FOUND["within_1_cm"], FOUND["error_95"] = share, float(np.percentile(np.abs(e), 95))
     return figure
 
 
@@ -152,7 +157,7 @@ def velocity() -> plt.Figure:
             first = {
                 key: t[np.argmax(np.array(v) > activation.suspend_above)] for key, v in (("s", still), ("m", moving))
             }
-            print(f"high danger {1e3 * (first['s'] - first['m']):.0f} ms earlier with the estimate")
+            FOUND["earlier"] = first["s"] - first["m"]
             axes[2].plot(t, still, color=GREY, linewidth=1.6, label="obstacle taken as standing still (paper)")
     approach = np.maximum(-np.gradient(true, t), 0.0)
     axes[1].plot(t, approach, color=GREY, linestyle="--", linewidth=1.0, label="true")
@@ -169,6 +174,7 @@ def main() -> None:
     with matplotlib.rc_context(STYLE):
         for name, draw in (("curve", curve), ("calibration", calibration), ("hold", hold), ("velocity", velocity)):
             draw().savefig(IMG / f"sensing-{name}.png", dpi=160)
+    note("sensing", FOUND)
 
 
 if __name__ == "__main__":

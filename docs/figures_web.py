@@ -88,7 +88,8 @@ def main(names: list[str]) -> None:
     """Draw some, or all."""
     path = chromium()
     if path is None:
-        raise SystemExit("figures_web: needs Chromium")
+        print("figures_web: Chromium is not installed, the pictures of the page stay as they are")
+        return
     for name in names or list(PICTURES):
         with tempfile.TemporaryDirectory() as folder, launched(patient(path, Path(folder))) as browser:
             PICTURES[name](browser, Path(folder))

@@ -12,37 +12,52 @@ from typing import Any
 import qpsafe
 from qpsafe.sensing.spots import load_spots
 from qpsafe.sim.drawing.film import medium_and_high
+from qpsafe.sim.experiments.fast_person import at_speed, experiment_with
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.sim.experiments.path.experiment import PathExperiment
+from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
+from qpsafe.sim.replay.settings import Experiment
 from qpsafe.sim.web.bodies import Bodies
 from qpsafe.sim.web.danger import Danger
 from qpsafe.sim.web.server import Page
 from qpsafe.sim.web.view import EYE, LOOK
 
 EVERY = 25  # ticks: ten pictures a second
-DURATION = 15.0  # the first approach and the way back [s]
+#: The frame on a page is smaller than the page of `qpsafe web`: nearer than there [m].
+NEAR = tuple(at + 0.7 * (eye - at) for eye, at in zip(EYE, LOOK, strict=True))
 
 
-def first_experiment() -> str:
-    """The first approach of the first experiment: rays, points, danger vectors, links coloured by danger."""
+def experiments() -> dict[str, Experiment]:
+    """What is recorded, by the name of its file."""
     robot = qpsafe.load_robot("irb140")
-    experiment = FixedExperiment(robot, duration=DURATION)
-    page = Page("127.0.0.1", 0, "first experiment")
+    return {
+        "first-experiment": FixedExperiment(robot, duration=15.0),  # the first approach and the way back
+        "second-experiment": PathExperiment(robot, duration=20.0),
+        "third-experiment": PickPlaceExperiment(robot, limit=32.0),  # until Ada has taken a screw
+        "fast-person": experiment_with("fixed", at_speed(2.0), robot),
+    }
+
+
+def recorded(experiment: Experiment) -> str:
+    """A run: rays, points, danger vectors, links coloured by danger."""
+    robot = experiment.robot
+    page = Page("127.0.0.1", 0, "an experiment")
     try:
         server = page.server
-        server.initial_camera.position, server.initial_camera.look_at = EYE, LOOK
+        server.initial_camera.position, server.initial_camera.look_at = NEAR, LOOK
         bodies = Bodies(server, experiment.scene)
         thresholds = medium_and_high(qpsafe.robot_activation(robot))
         danger = Danger(server, experiment.scene, load_spots(robot), bodies, thresholds)
-        recorded = server.get_scene_serializer()
+        frames = server.get_scene_serializer()
 
         def watch(tick: Any, scene: Any, plant: Any) -> None:
             if tick.reference.seq % EVERY == 0:
                 bodies.show(plant.data)
                 danger.show(tick, plant.q)
-                recorded.insert_sleep(EVERY * 0.004)
+                frames.insert_sleep(EVERY * 0.004)
 
         experiment.run(watch)
-        return recorded.as_html()
+        return frames.as_html()
     finally:
         page.close()
 
@@ -50,4 +65,5 @@ def first_experiment() -> str:
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "first-experiment.html").write_text(first_experiment(), encoding="utf-8")
+    for name, experiment in experiments().items():
+        (folder / f"{name}.html").write_text(recorded(experiment), encoding="utf-8")

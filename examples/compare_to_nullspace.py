@@ -18,8 +18,8 @@ worst = {}
 deviations = []
 for state in random_states(count):  # n = 6, 7, 9; singular and rank-deficient tasks; m and f from 0 to 1
     qp = law.solve(state.problem()).qd
-    source = state.source_velocity()  # eq. (22), by pseudoinverses
-    deviation = float(np.abs(qp - source).max())
+    paper = state.paper_velocity()  # eq. (22), by pseudoinverses
+    deviation = float(np.abs(qp - paper).max())
     deviations.append(deviation)
     worst[state.kind] = max(worst.get(state.kind, 0.0), deviation)
 

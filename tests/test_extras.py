@@ -9,6 +9,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from typer.main import get_command
+
+from qpsafe.__main__ import EXTRAS
+from qpsafe.cli.main import app
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -86,7 +91,7 @@ from qpsafe.errors import MissingExtraError
 said = {}
 for extra, code in json.loads(sys.argv[3]).items():
     try:
-        exec(code, {"folder": sys.argv[4]})
+        exec(code, {"folder": sys.argv[4], "sys": sys})
         said[extra] = "nothing"
     except MissingExtraError as error:
         said[extra] = str(error)
@@ -161,6 +166,44 @@ def test_what_is_missing_is_named_by_its_extra(present: str, asked: dict[str, st
     assert {extra: f"pip install 'qpsafe[{extra}]'" in str(words) for extra, words in said.items()} == dict.fromkeys(
         asked, True
     ), said
+
+
+#: What commands need that a robot's computer does not.
+NEEDED = {
+    "demo": {"mujoco", "matplotlib"},
+    "web": {"viser", "mujoco"},
+    "place": {"trimesh", "mujoco"},
+    "campaign": {"pyarrow", "mujoco"},
+    "tune": {"optuna", "pyarrow"},
+    "bench": {"mink"},
+    "stream": {"protobuf"},
+    "irc5-sim": {"protobuf", "mujoco"},
+    "irc5-faults": {"protobuf", "mujoco"},
+}
+
+
+def brought(extras: str) -> set[str]:
+    """Names of the packages that extras bring, those on which they build included."""
+    found = set()
+    for extra in extras.split(","):
+        for wanted in map(Requirement, PROJECT["optional-dependencies"][extra]):
+            found |= brought(",".join(wanted.extras)) if wanted.name == "qpsafe" else {wanted.name}
+    return found
+
+
+def test_a_command_is_told_every_extra_that_it_needs() -> None:
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    assert set(EXTRAS) | set(NEEDED) <= set(commands)
+    for name in commands:
+        assert {"typer", "rich"} | NEEDED.get(name, set()) <= brought(EXTRAS.get(name, "sim")), name
+
+
+@pytest.mark.parametrize("words", [["demo", "fixed", "--seed", "3"], ["web"]])
+def test_who_has_the_base_only_is_told_the_whole_command(words: list[str], tmp_path: Path) -> None:
+    """As `uvx qpsafe demo fixed` has it, which installs no extra."""
+    said = run(tmp_path, ASK, "", json.dumps({"cli": f"sys.argv[1:] = {words!r}; {BARE['cli']}"}), "")["cli"]
+    source = f"'qpsafe[{EXTRAS.get(words[0], 'sim')}]' qpsafe {' '.join(words)}"
+    assert f"uvx --from {source}, or pipx run --spec {source}" in str(said)
 
 
 def test_every_extra_is_asked_for() -> None:

@@ -66,6 +66,24 @@ def test_the_citation_states_what_it_must() -> None:
     assert paper["title"].lower() in " ".join((ROOT / "README.md").read_text("utf-8").replace("> ", "").lower().split())
 
 
+def test_a_release_says_where_it_comes_from(tmp_path: Path) -> None:
+    """The workflow's own step, run on a copy."""
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8"))
+    (step,) = (step for step in workflow["jobs"]["build"]["steps"] if "project.urls" in step.get("run", ""))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    where = {"GITHUB_SERVER_URL": "https://github.com", "GITHUB_REPOSITORY": "some/robots"}
+    where |= {"GITHUB_REPOSITORY_OWNER": "some", "GITHUB_REF_NAME": "v1.2.3"}
+    subprocess.run(["bash", "-e", "-c", step["run"]], cwd=tmp_path, env=os.environ | where, check=True)
+    made = tomllib.loads((tmp_path / "pyproject.toml").read_text(encoding="utf-8"))
+    assert made["project"].pop("urls") == PROJECT["urls"] | {
+        "Documentation": "https://some.github.io/robots",
+        "Source": "https://github.com/some/robots",
+        "Issues": "https://github.com/some/robots/issues",
+        "Changelog": "https://github.com/some/robots/blob/v1.2.3/CHANGELOG.md",
+    }
+    assert made == PYPROJECT | {"project": {key: value for key, value in PROJECT.items() if key != "urls"}}
+
+
 def test_one_range_of_pythons() -> None:
     """requires-python, classifiers, the workflow's matrix and the Makefile's check agree."""
     listed = {c.rpartition(" ")[2] for c in PROJECT["classifiers"] if c.startswith("Programming Language")}

@@ -59,7 +59,7 @@ def on_missing(app: Any, env: Any, node: pending_xref, content: nodes.Element) -
 
 
 class Recording(Directive):
-    """A moving picture of build/recordings, if `docs/recordings.py` has made it; its caption in any case."""
+    """A moving picture of build/recordings, with its caption; nothing if `docs/recordings.py` has not made it."""
 
     required_arguments = 1
     has_content = True

@@ -13,6 +13,7 @@ from qpsafe import __version__
 from qpsafe.cli import (
     bench,
     calibrate,
+    calibrate_camera,
     check,
     compare,
     irc5_faults,
@@ -47,6 +48,7 @@ app.command("tune")(tune.tune)
 app.command("bench")(bench.bench)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
+app.command("calibrate-camera")(calibrate_camera.calibrate_camera)
 app.command("story")(story.story)
 app.command("replay")(replay.replay)
 app.command("web")(web.web)

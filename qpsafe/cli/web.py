@@ -36,6 +36,9 @@ def web(
     story: Annotated[
         Path | None, typer.Option(help="TOML file of a story: people who come besides the dragged one.")
     ] = None,
+    cell: Annotated[
+        Path | None, typer.Option(help="TOML file of the furniture around the robot, which the controller knows.")
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to serve at; any but this computer's own requires a token.")] = (
         "127.0.0.1"
     ),
@@ -67,7 +70,8 @@ def web(
     from qpsafe.sim.web.view import Looks
 
     robot = ready_robot(robot, screen)
-    setup = Setup(robot, HOLD if program is None else str(program), NOBODY if story is None else str(story))
+    task, people = HOLD if program is None else str(program), NOBODY if story is None else str(story)
+    setup = Setup(robot, task, people, "" if cell is None else str(cell))
     setup.experiment().start  # noqa: B018  what is wrong is said before anything is served
     page = Page(host, port, TITLE, token_for(host, token))
     try:

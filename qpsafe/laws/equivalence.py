@@ -34,7 +34,7 @@ class State(NamedTuple):
         lower = None if limit is None else -limit
         return LawProblem(tasks, self.qd0, (self.m, self.m * self.f), lower, limit)
 
-    def source_velocity(self) -> _Matrix:
+    def paper_velocity(self) -> _Matrix:
         """q̇ of eq. (22), by pseudoinverses."""
         return nullspace_velocity(self.J_H, self.J_L, self.xd_H, self.xd_L, self.qd0, self.m, self.f)
 
@@ -174,11 +174,11 @@ def compare_states(
     for i, state in enumerate(random_states(count, seed)):
         bound = None
         if with_limits:
-            corners = [state._replace(m=m, f=f).source_velocity() for m, f in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))]
+            corners = [state._replace(m=m, f=f).paper_velocity() for m, f in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))]
             bound = 1.0 + max(float(np.abs(qd).max()) for qd in corners)
-        source = state.source_velocity()
-        difference = law.solve(state.problem(bound)).qd - source
-        norms = float(np.abs(difference).max()), float(np.abs(source).max())
+        paper = state.paper_velocity()
+        difference = law.solve(state.problem(bound)).qd - paper
+        norms = float(np.abs(difference).max()), float(np.abs(paper).max())
         found.setdefault(state.kind, []).append(norms)
         if progress is not None:
             progress(i + 1)

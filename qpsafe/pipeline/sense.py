@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+CLOUD = 1_000  # more points are reduced, see `qpsafe.ranging.cloud`
 _NOBODY, _NOWHERE = np.empty((0, 3)), np.empty(0, dtype=np.int64)
 
 
@@ -174,7 +175,9 @@ class Sense:
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
         if ages is not None:  # old points would count as seen now
             raise BadInput("ages are given with points, which have none: leave out points that are too old")
-        given = as_points(value)
+        given, notes = as_points(value), ()
+        if len(given) > CLOUD:
+            given, notes = self._reduced(q, qd, given)
         p = len(given) + len(more.points)
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0, work = np.empty(len(q)), np.empty(work_size(self._sizes, p))
@@ -185,8 +188,17 @@ class Sense:
             refuse(q, qd, self._robot)
         if count < 0:
             refuse_points(points)
-        seen = self._with(Seen(points, links, danger, vectors, cdf_n, qd0), more)
+        seen = self._with(Seen(points, links, danger, vectors, cdf_n, qd0, notes), more)
         return self._ended(seen, work, p if len(more.points) else 0)
+
+    def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
+        """The points of a cloud that count, and that it was reduced."""
+        from qpsafe.ranging.cloud import check_size, reduced  # compiled when it is asked for
+
+        check_size(given)
+        wire = self._robot.at(as_joint_position(q, self._robot)).wire(as_joint_velocity(qd, self._robot))
+        kept = reduced(given, wire)
+        return kept, (f"{len(given)} points are reduced to the {len(kept)} nearest to the links",)
 
     def _with(self, seen: Seen, more: Ranged) -> Seen:
         """The same with what images tell beside their points."""

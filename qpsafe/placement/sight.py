@@ -82,7 +82,7 @@ class SelfSight:
         self._held = held_positions(self._model, robot.held)
         self._poses, self.around_home = self._free()
         self.configurations = np.array([pose.q for pose in self._poses])
-        self._batch = mujoco.batch.Batch(self._model, len(self._poses))
+        self._batch = mujoco.batch.Batch(self._model, len(self._poses), nthread=1)  # rays are cast pose by pose
         self._batch.bind("qpos")[:, self._held[0]] = self._held[1]
         self._batch.bind("qpos")[:, self._q] = self.configurations
 
@@ -152,8 +152,7 @@ class SelfSight:
             meets = may_meet(origins, rays, pose.centres[others], pose.axes[others], boxes, reach, 0.0)
             distance, _ = self._batch.ray(origins[meets], rays[meets], geomgroup=seen, bodyexclude=own, ids=[i])
             meets[meets] = ((distance >= 0.0) & (distance < reach)).ravel()
-            meets = meets.reshape(len(some), -1).any(axis=1)
-            times[some[meets]] += 1
+            times[some[meets.reshape(len(some), -1).any(axis=1)]] += 1
             left = left[times[left] <= most]
             if not len(left):
                 break

@@ -1,6 +1,6 @@
 """What is known between two images, compiled: points are kept, moved, forgotten, and chosen from.
 
-A point of a sensor's last image counts where it was seen; what its velocity does is in `qpsafe.ranging.prediction`. A
+A point of a sensor's last image counts where it was seen; its velocity is for `qpsafe.ranging.tracking.prediction`. A
 point that the next image does not show is lost: it still counts for a while, and meanwhile comes nearer at the walking
 speed of ISO 13855, as with spots.
 """
@@ -12,9 +12,10 @@ from math import inf, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
-from qpsafe.ranging import prediction, reduce_kernel
-from qpsafe.ranging.prediction import person_speed
-from qpsafe.ranging.reduce_kernel import to_link
+from qpsafe.ranging import nearest_kernel
+from qpsafe.ranging.nearest_kernel import to_link
+from qpsafe.ranging.tracking import prediction
+from qpsafe.ranging.tracking.prediction import person_speed
 from qpsafe.robot.kinematics import Index
 
 #: Columns of a kept point: place, velocity, how wrong the place may be, when it was seen, when it was lost (inf: not).
@@ -83,7 +84,7 @@ def renew(
         _out,
         _out,
     ),
-    reduce_kernel,
+    nearest_kernel,
     prediction,
     *prediction.USES,
 )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +13,16 @@ from qpsafe.fixed import Fixed
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
 from qpsafe.ranging.checks import checked_sensors
 from qpsafe.ranging.configurations import Configurations
+from qpsafe.ranging.inbox import Inbox
 from qpsafe.ranging.judge import Judge
-from qpsafe.ranging.prediction import Foresight
 from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.ranging.reduce import Reducer
-from qpsafe.ranging.rules import RangeRules
+from qpsafe.ranging.rules import OCCUPIED, RangeRules
 from qpsafe.ranging.sensor import WORLD, RangeImage, RangeSensor
-from qpsafe.ranging.velocities import MOST, Velocities
-from qpsafe.ranging.watch import SensorWatch
+from qpsafe.ranging.tracking.prediction import Foresight
+from qpsafe.ranging.tracking.velocities import MOST, Velocities
+from qpsafe.ranging.unseen import Together
+from qpsafe.ranging.watch import LATE, SensorWatch
 from qpsafe.sensing.body import body_hull_set, fixed_to
 from qpsafe.sensing.detection import BadInput
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
@@ -71,7 +72,6 @@ class RangeSensing(Fixed):
         for frame, things in ({} if carried is None else carried).items():
             hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
         self._robot, count, links = robot, len(self.sensors), len(robot.wire_frames)
-        self._index = {sensor.name: i for i, sensor in enumerate(self.sensors)}
         self._judges = [Judge(sensor) for sensor in self.sensors]
         self._watches = [SensorWatch(sensor, self.rules, self.sensing) for sensor in self.sensors]
         self._reducers = [Reducer(sensor, self.rules, self.sensing, hulls, links) for sensor in self.sensors]
@@ -94,10 +94,16 @@ class RangeSensing(Fixed):
         self._used = np.empty((2, count, links), dtype=np.int64)
         self._tracks = [Velocities(sensor.sigma) for sensor in self.sensors] if self.rules.predict else []
         self._foresight = Foresight(total)
+        self._together: Together | None = None
+        if count > 1 or self.rules.unseen == OCCUPIED:
+            self._together = Together(
+                self._reducers, self.sensing.tolerance, self.rules.deviations, hulls, self.sensing.approach_speed
+            )
+        self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq)
         self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
-        self._waiting: deque[Any] = deque()
+        self._inbox = Inbox(self.sensors, self.rules.budget)
         self._now, self._seen = 0.0, np.zeros(count)
         self.reset()
 
@@ -119,8 +125,11 @@ class RangeSensing(Fixed):
         for tracks in self._tracks:
             tracks.reset()
         self._counts[:] = 0
+        if self._together is not None:
+            self._together.reset()
+        self._hidden_places, self._looked = _NONE, False
         self._past.reset()
-        self._waiting.clear()
+        self._inbox.reset()
         self.unseen: tuple[str, ...] = ()
         self.stopped = self._doubted = False
         self._begin = True  # sensors are waited for from the next tick on
@@ -157,8 +166,9 @@ class RangeSensing(Fixed):
             self._store, self._counts, self._carriers, self._patience, self._numbers, wire.starts, wire.ends,
             *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
+        hidden = self._hidden(now, state, wire)
         if not total:
-            return Ranged(_NONE, _NO_LINKS, _NONE, _NONE, _NO_LEADS, tuple(notes))
+            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
         points, links, velocities = (array[:total] for array in self._placed)
         points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
@@ -174,10 +184,16 @@ class RangeSensing(Fixed):
             self._chosen,
         )
         chosen = self._chosen[:count]
-        return Ranged(
-            points[chosen], links[chosen], velocities[chosen], self._near[:total].copy(), self._leads[:total].copy(),
-            tuple(notes),
-        )  # fmt: skip
+        near, leads = self._near[:total].copy(), self._leads[:total].copy()
+        if len(hidden):
+            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, np.zeros(len(hidden))))
+        return Ranged(points[chosen], links[chosen], velocities[chosen], near, leads, tuple(notes))
+
+    def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
+        """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
+        if self.rules.unseen == OCCUPIED and self._looked and self._together is not None:
+            self._hidden_places, self._looked = self._together.unseen(wire, state.body_poses(), now), False
+        return self._hidden_places
 
     def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:
         """Where points count that come nearer, and their velocities there; at rest by a field of another making."""
@@ -190,38 +206,14 @@ class RangeSensing(Fixed):
 
     def _take_all(self, images: Any, now: float, wire: Wire) -> list[str]:
         """Take the images that came, as many as there is time for; what is wrong, in words."""
-        notes: list[str] = []
-        if isinstance(images, RangeImage):
-            images = (images,)
-        if not isinstance(images, Iterable):
-            return [f"images are no list of RangeImages but {type(images).__name__}"]
-        self._waiting.extend(images)
-        budget = self.rules.budget
-        while self._waiting:
-            image = self._waiting[0]
-            who = self._index.get(image.sensor.name) if _is_image(image) else None
-            if who is None:
-                what = (
-                    f"of {image.sensor.name!r}, which is not among range_sensors"
-                    if _is_image(image)
-                    else "no RangeImage"
-                )
-                notes.append(f"an image is {what}")
-                self._waiting.popleft()
-                continue
-            budget -= len(self.sensors[who])
-            if budget < 0 and budget + len(self.sensors[who]) < self.rules.budget:
-                break  # the rest waits for the next tick
-            self._waiting.popleft()
+        taken, notes = self._inbox.take(images)
+        for who, image in taken:
             try:
                 wrong = self._take(who, image, now, wire)
             except BadInput as problem:
                 wrong = str(problem)
-            if wrong and wrong != "late":
+            if wrong and wrong != LATE:
                 notes.append(f"image of {self.sensors[who].name} unusable: {wrong}")
-        while len(self._waiting) > 4 * len(self.sensors):  # they come faster than they can be taken
-            self._waiting.popleft()
-            notes.append("images come faster than they can be taken: the oldest are left out")
         return list(dict.fromkeys(notes))
 
     def _take(self, who: int, image: RangeImage, now: float, wire: Wire) -> str:
@@ -243,6 +235,9 @@ class RangeSensing(Fixed):
                 around = self._reducers[who].around(count, shown.seen, MOST)
                 velocities = self._tracks[who](given.stamp, around, None if fixed else pose)[:count]
             self._renew(who, given.stamp, count, velocities)
+            if self._together is not None:
+                self._together.take(who, given.stamp, pose, self._store, self._counts)
+                self._looked = True
         return wrong
 
     def _renew(self, who: int, stamp: float, count: int, velocities: Array) -> None:
@@ -288,8 +283,4 @@ def _mounted(robot: Robot, sensor: RangeSensor) -> tuple[int, Array]:
     return body, place @ sensor.pose
 
 
-def _is_image(image: Any) -> bool:
-    return isinstance(image, RangeImage) and isinstance(image.sensor, RangeSensor)
-
-
-_NONE, _NO_LINKS, _NO_LEADS = np.empty((0, 3)), np.empty(0, dtype=np.int64), np.empty(0)
+_NONE, _NO_LINKS = np.empty((0, 3)), np.empty(0, dtype=np.int64)

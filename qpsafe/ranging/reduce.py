@@ -86,7 +86,7 @@ class Reducer:
     Attributes:
         zones: The sensor, or its tiles.
         size: Pixels along the edge of a tile.
-        distances: Of the zones of the last image (z,) [m].
+        distances, valid, sigma: Of the zones of the last image (z,).
         kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
     """
 
@@ -103,7 +103,7 @@ class Reducer:
         self._stride = farthest_zone(count)
         self._work = np.empty((count, 4)), np.empty((links, count)), np.empty(count, dtype=np.int64)
         self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
-        self.distances = np.empty(count)
+        self.distances, self.valid, self.sigma = np.empty(count), np.zeros(count, dtype=np.bool_), np.empty(count)
         self.kept = np.empty((links * rules.each, 4))
         self._shown = np.zeros(SHOWN, dtype=np.int64)
 
@@ -134,7 +134,7 @@ class Reducer:
             tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
             sigma = np.full(len(nearest), float(sigma.max(initial=0.0)) if sigma.size > 1 else float(sigma[0]))
             distances, valid = nearest, known
-        self.distances = distances
+        self.distances, self.valid, self.sigma = distances, valid, sigma
         count = reduce_zones(
             distances, sigma, valid, self.zones.directions, self._slants, pose, self._numbers,
             wire.starts, wire.ends, then, *self._tables, *self._work, carrier, self._each, self._stride, self.kept,

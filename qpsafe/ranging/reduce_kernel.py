@@ -14,6 +14,8 @@ import numpy as np
 from numba import types
 
 from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
+from qpsafe.ranging import nearest_kernel
+from qpsafe.ranging.nearest_kernel import keep_nearest, to_link
 from qpsafe.robot.kinematics import Index, place
 from qpsafe.sensing import hulls
 from qpsafe.sensing.hulls import within
@@ -24,14 +26,6 @@ SHOWN = 8
 #: Numbers of a call: the sensor's range, tolerance, how far points of a link are spread apart, how far away from the
 #: wire points still matter [m], by how many standard deviations a reading may be wrong.
 NEAREST, FARTHEST, TOLERANCE, SPREAD, REACH, DEVIATIONS = range(6)
-
-
-@inline
-def to_link(p: Vector, r0: Array, r1: Array, link: int) -> float:
-    """Square of the distance of a point from a link of the wire."""
-    d, w = add(row(r1, link), -1.0, row(r0, link)), add(p, -1.0, row(r0, link))
-    n = add(w, -min(max(dot(w, d) / max(dot(d, d), 1e-300), 0.0), 1.0), d)
-    return dot(n, n)
 
 
 @inline
@@ -124,7 +118,7 @@ _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1
         readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole,
         types.int64, types.int64, types.int64, _outs, _whole,
     ),
-    hulls,
+    hulls, nearest_kernel,
 )  # fmt: skip
 def reduce_zones(
     distances: Array,
@@ -213,26 +207,7 @@ def reduce_zones(
         zones[n] = 0
         n += 1
     shown[SEEN] = n
-    spread, count = numbers[SPREAD] * numbers[SPREAD], 0
-    for k in range(links):
-        for _ in range(each):
-            best, nearest = -1, inf
-            for i in range(n):
-                if away[k, i] < nearest:
-                    best, nearest = i, away[k, i]
-            if best < 0:
-                break
-            b = row(found, best)
-            for i in range(n):  # what lies beside it is no other danger
-                w = add(row(found, i), -1.0, b)
-                if dot(w, w) <= spread:
-                    away[k, i] = inf
-            if zones[best] == 0:  # not kept for another link
-                zones[best] = 1
-                for c in range(4):
-                    kept[count, c] = found[best, c]
-                count += 1
-    return count
+    return keep_nearest(found, n, away, zones, each, numbers[SPREAD], kept)
 
 
 @entry(

@@ -6,6 +6,8 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.text.words import call
 
+FREE, OCCUPIED = "free", "occupied"
+
 
 class RangeRules(Fixed):
     """Numbers for images; times and tolerances that spots have too are in `SensingRules`.
@@ -30,16 +32,19 @@ class RangeRules(Fixed):
         horizon: How far ahead of now a thing that comes nearer counts, at its velocity [s].
         acceleration: How fast people become faster, a_h [m/s²]; ours.
         fastest: How fast anybody becomes [m/s]; a run.
+        unseen: What the gate takes for granted of places near the robot that a sensor covers (`RangeSensor.covers`) but
+            none looks through, behind things and where zones tell nothing: "free", or "occupied", that somebody may
+            stand there. Around what no sensor covers nothing is taken for granted.
 
     Raises:
         ConfigurationError: A number out of range.
     """
 
     def __init__(
-        self, most: int = 1, *, apart: float = 0.08, each: int = 2, spread: float = 0.04, reach: float = 2.0,
+        self, most: int = 1, *, apart: float = 0.08, each: int = 2, spread: float = 0.04, reach: float = 1.0,
         deviations: float = 3.0, through: float = 0.3, few: int = 4, misplaced: int = 3, dense: int = 5000,
         support: int = 3, budget: int = 400_000, predict: bool = True, horizon: float = 0.0,
-        acceleration: float = 1.0, fastest: float = 2.5,
+        acceleration: float = 1.0, fastest: float = 2.5, unseen: str = FREE,
     ) -> None:  # fmt: skip
         whole = {
             "most": (most, 1), "each": (each, 1), "few": (few, 1), "misplaced": (misplaced, 1), "dense": (dense, 64),
@@ -53,7 +58,9 @@ class RangeRules(Fixed):
             raise ConfigurationError("RangeRules", "support", support, "1 to 4 pixels")
         if not isinstance(predict, bool):
             raise ConfigurationError("RangeRules", "predict", predict, "True or False")
-        self.predict = predict
+        if unseen not in (FREE, OCCUPIED):
+            raise ConfigurationError("RangeRules", "unseen", unseen, f"{FREE} or {OCCUPIED}")
+        self.predict, self.unseen = predict, unseen
         real = {
             "apart": apart, "spread": spread, "reach": reach, "deviations": deviations, "through": through,
             "horizon": horizon, "acceleration": acceleration, "fastest": fastest,
@@ -79,6 +86,7 @@ class RangeRules(Fixed):
     horizon: float
     acceleration: float
     fastest: float
+    unseen: str
 
     def __repr__(self) -> str:
         rest = {key: getattr(self, key) for key in self.__annotations__ if key != "most"}

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+LATE = "late"  # after a newer one of the same sensor
+
 
 class SensorWatch:
     """Watches one sensor.
@@ -65,7 +67,7 @@ class SensorWatch:
             return f"stale, {now - stamp:.3g} s old"
         if stamp <= self.stamp:
             self.late += 1
-            return "late"
+            return LATE
         return ""
 
     def judged(self, stamp: float, distances: Array, shown: Shown, where: Array) -> str:

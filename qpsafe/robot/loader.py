@@ -55,7 +55,7 @@ def load_robot(
         home: Home pose for a bare model file, (n,) [rad]; if not given, the keyframe "home" of an MJCF, else zero,
             moved inside the limits.
         hold: Joints of a bare model file that are held in place, and where, e.g. ``{"finger": 0.02}`` [rad or m].
-        parameters: Of its controllers: "robot" for what its file states, "paper" for the source's, see
+        parameters: Of its controllers: "robot" for what its file states, "paper" for the paper's, see
             `Robot.with_parameters`.
 
     Returns:

@@ -134,7 +134,7 @@ class Robot(Fixed):
         """The same robot with the parameters of its file, or with none of them.
 
         Args:
-            parameters: "robot": itself. "paper": the source's thresholds, carried over by the rule of
+            parameters: "robot": itself. "paper": the paper's thresholds, carried over by the rule of
                 `qpsafe.danger.thresholds`; evasion, recovery, sensing and gate as where a file states none.
         """
         if parameters not in ("robot", "paper"):

@@ -18,7 +18,6 @@ from qpsafe.sim.ranging.zones import ZoneSensors
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 if TYPE_CHECKING:
-    from qpsafe.robot.robot import Robot
     from qpsafe.sim.campaign.station import Station
     from qpsafe.sim.engine.tracks import PersonTracks
 
@@ -26,7 +25,6 @@ Array = NDArray[np.float64]
 
 LOOK = 5.0  # how far a Sharp sensor is moved by what it sees [m]
 NEAR = 0.8  # how far monitors with perfect sight look: nothing limits their speed farther away [m]
-SHARP_LATE = 0.055  # a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s]
 UNITS = 0  # seed of the units: the robot has the same sensors in all trials, noise is each trial's own
 
 
@@ -97,19 +95,6 @@ class Senses:
     def nearest(self, q: Array, k: int) -> Array:
         """Where everybody is nearest to each link of the robot at tick k (p, 3) [m], see `Sight`; q (n,) [rad]."""
         return self._sight.points(self._station.robot.at(q), self.tracks.row(k))
-
-
-def delay(sensor: str, robot: Robot) -> float:
-    """How late sensors tell what is there, at most [s].
-
-    Args:
-        sensor: As for `Plan`.
-        robot: The robot.
-    """
-    kinds = sensor_kinds(sensor)
-    sensors, models = range_sensors(kinds.ranging, robot)
-    images = (model.latency + sensor.period for sensor, model in zip(sensors, models, strict=True))
-    return max(images, default=SHARP_LATE if kinds.spots == "sharp" else 0.0)
 
 
 @cache

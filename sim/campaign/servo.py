@@ -1,8 +1,9 @@
-"""The robot's joints in a trial: they follow a reference at once, or as joints of second order behind a delay."""
+"""Joints in a trial: they follow a reference at once, or as joints of second order behind a delay; how they stop."""
 
 from __future__ import annotations
 
 from math import exp
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import types
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.compiled.memory import view
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -105,3 +109,34 @@ class Servo:
             after, rate = np.empty_like(q), np.empty_like(q)
             _follow(self.q, self.qd, *self._waiting.pop(0), OMEGA, DT, after, rate)
             self.q, self.qd = after, rate
+
+
+def wire_speeds(robot: Robot, q: Array, qd: Array) -> Array:
+    """Of the ends of the wire [m/s].
+
+    Args:
+        robot: The robot.
+        q: Its position (n,) [rad].
+        qd: Its velocity (n,) [rad/s].
+    """
+    wire = robot.wire(q, qd)
+    return np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1)
+
+
+def stopped(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
+    """a_s = v²/(2 s) of the slowest stop among the points that move [m/s²].
+
+    Args:
+        robot: The robot.
+        q: Its position (n,) [rad].
+        qd: Its velocity (n,) [rad/s].
+        dt: Tick [s].
+    """
+    speeds = wire_speeds(robot, q, qd)
+    counted = speeds >= 0.5 * speeds.max()
+    way, v, here = np.zeros_like(speeds), qd.copy(), q.copy()
+    while np.abs(v).max() > 0.0:
+        v = v - np.clip(v, -robot.max_acceleration * dt, robot.max_acceleration * dt)
+        here = here + v * dt
+        way += dt * wire_speeds(robot, here, v)
+    return float((speeds[counted] ** 2 / (2.0 * way[counted])).min())

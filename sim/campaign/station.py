@@ -19,15 +19,14 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
-from qpsafe.sim.campaign.senses import delay
-from qpsafe.sim.campaign.servo import OMEGA
+from qpsafe.sim.campaign.servo import OMEGA, stopped, wire_speeds
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.for_robot import line_for
 from qpsafe.sim.experiments.pick_place.cell import Cell
 from qpsafe.sim.experiments.pick_place.for_robot import work_for
-from qpsafe.sim.ranging.sets import range_sensors, sensor_kinds
+from qpsafe.sim.ranging.sets import delay, range_sensors, sensor_kinds
 from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
@@ -235,14 +234,14 @@ class Station:
         wire that go at least half as fast as the fastest one, s the way they take to rest.
         """
         rng = np.random.default_rng(7)
-        return min(_stop(self.robot, q, qd) for q, qd in self._moments(rng))
+        return min(stopped(self.robot, q, qd) for q, qd in self._moments(rng))
 
     @cached_property
     def speed(self) -> float:
         """Of the fastest end of the wire in the nominal motion; 0 where there is none [m/s]."""
         if self.program is None:
             return 0.0
-        return max(float(_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
+        return max(float(wire_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
 
     def _moments(self, rng: np.random.Generator) -> Sequence[tuple[Array, Array]]:
         """Configurations and joint velocities from which the robot may have to stop."""
@@ -251,7 +250,7 @@ class Station:
             found = []
             for _ in range(60):
                 wild = rng.normal(size=robot.nq) * robot.max_velocity
-                found.append((robot.home, 0.5 / _speeds(robot, robot.home, wild).max() * wild))
+                found.append((robot.home, 0.5 / wire_speeds(robot, robot.home, wild).max() * wild))
             return found
         frame, found = robot.tool_frames[0], []
         q: Array = self.start
@@ -259,27 +258,9 @@ class Station:
             sample = self.program.sample(float(t))
             q = joints_for(robot, frame, sample.pose, q)
             qd = np.asarray(np.linalg.pinv(robot.jacobian(frame, q)) @ sample.twist, dtype=np.float64)
-            if _speeds(robot, q, qd).max() > 0.1:
+            if wire_speeds(robot, q, qd).max() > 0.1:
                 found.append((q, qd))
         return found
-
-
-def _speeds(robot: Robot, q: Array, qd: Array) -> Array:
-    """Of the ends of the wire [m/s]."""
-    wire = robot.wire(q, qd)
-    return np.linalg.norm(np.vstack((wire.start_velocities, wire.end_velocities)), axis=1)
-
-
-def _stop(robot: Robot, q: Array, qd: Array, dt: float = 0.004) -> float:
-    """a_s = v²/(2 s) of the slowest stop among the points that move [m/s²]."""
-    speeds = _speeds(robot, q, qd)
-    counted = speeds >= 0.5 * speeds.max()
-    way, v, here = np.zeros_like(speeds), qd.copy(), q.copy()
-    while np.abs(v).max() > 0.0:
-        v = v - np.clip(v, -robot.max_acceleration * dt, robot.max_acceleration * dt)
-        here = here + v * dt
-        way += dt * _speeds(robot, here, v)
-    return float((speeds[counted] ** 2 / (2.0 * way[counted])).min())
 
 
 @cache

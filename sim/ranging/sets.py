@@ -27,6 +27,7 @@ RANGING = (ARRAYS, ARRAYS + IDEAL, CAMERA, CAMERA + IDEAL)
 PLACE, TARGET = (-1.5, 0.0, 1.6), (0.6, 0.0, 0.0)  # of the camera, and where it looks; from the robot's base [m]
 FULL, FOCAL, STEP = (480, 640), 385.0, 8
 CAMERA_RANGE = (0.2, 4.0)  # [m]
+SHARP_LATE = 0.055  # a Sharp's cycle of 38 ms and its two low passes, 3 and 13 ms [s]
 
 
 class SensorKinds(NamedTuple):
@@ -80,6 +81,19 @@ def range_sensors(kinds: tuple[str, ...], robot: Robot) -> tuple[list[RangeSenso
         sensors += found
         models += [Ideal(cones=arrays) if kind.endswith(IDEAL) else real] * len(found)
     return sensors, models
+
+
+def delay(sensor: str, robot: Robot) -> float:
+    """How late sensors tell what is there, at most [s].
+
+    Args:
+        sensor: See `sensor_kinds`.
+        robot: The robot.
+    """
+    kinds = sensor_kinds(sensor)
+    sensors, models = range_sensors(kinds.ranging, robot)
+    images = (model.latency + sensor.period for sensor, model in zip(sensors, models, strict=True))
+    return max(images, default=SHARP_LATE if kinds.spots == "sharp" else 0.0)
 
 
 def overhead_camera(name: str = "overhead camera") -> RangeSensor:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from qpsafe.controller import SafetyController
@@ -18,6 +19,7 @@ from qpsafe.laws.problem import Law
 from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.recovery.recovery import RecoveryRules
 from qpsafe.robot.loader import bundled_robots, find_robot, load_robot
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
@@ -66,6 +68,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "kind": kind,
         "story": None if story is None else {"floor": story.floor, **story.table.model_dump(mode="json")},
         "choreography": _choreography(experiment.choreography) if story is None else None,
+        "cell": [[obstacle.name, obstacle.vertices.tolist()] for obstacle in experiment.cell],
     }
     if isinstance(experiment, PathExperiment):
         found["program"] = experiment.program_text
@@ -89,6 +92,8 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
         if settings["kind"] == KIND:
             return pick_of(robot, settings, options)
         options |= {name: settings[name] for name in PLAIN}
+        furniture = settings.get("cell", ())  # older runs had none
+        options["cell"] = tuple(Obstacle(name, np.array(vertices)) for name, vertices in furniture)
         if settings["story"] is not None:
             options["story"] = _story_of(settings["story"])
         else:

@@ -15,6 +15,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.by_name import law_named
 from qpsafe.robot.loader import load_robot
+from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sim.campaign.people.model import EncounterModel
 from qpsafe.sim.campaign.station import LINE, Station
 from qpsafe.sim.experiments.fast_person import at_speed
@@ -45,6 +46,7 @@ class Setup:
         robot: As for `load_robot`.
         task: `HOLD`, `MOVE`, or the path of a program's file.
         story: `NOBODY`, `STRAIGHT`, `RANDOM`, or the path of a story's file: who comes besides the one who is dragged.
+        cell: Path of a cell's file, whose furniture stands there besides the pedestal; "" for none.
         seed: Of the people at random.
         board: Whether the person who is dragged carries a card board.
         sight: ``ideal``, ``sharp`` or ``perfect``; a robot without sensors has perfect sight.
@@ -61,6 +63,7 @@ class Setup:
     robot: str = "irb140"
     task: str = HOLD
     story: str = NOBODY
+    cell: str = ""
     seed: int = 0
     board: bool = False
     sight: str = "ideal"
@@ -79,9 +82,9 @@ class Setup:
         return all(getattr(self, name) == getattr(other, name) for name in kept)
 
     @property
-    def scenery(self) -> tuple[str, str, int, bool]:
+    def scenery(self) -> tuple[str, str, str, int, bool]:
         """The fields that decide how the scene looks."""
-        return self.robot, self.story, self.seed, self.board
+        return self.robot, self.story, self.cell, self.seed, self.board
 
     def experiment(self) -> FixedExperiment:
         """The experiment; its story's first person is the one who is dragged.
@@ -95,6 +98,7 @@ class Setup:
         given: dict[str, Any] = {
             "sensor": "perfect" if robot.spots_path is None else self.sight,
             "story": self._story(robot),
+            "cell": load_cell(self.cell) if self.cell else (),
             "lag": self.lag,
             "duration": LONGEST,
             "law": law_named(self.law, self.projection),
@@ -164,7 +168,7 @@ class Setup:
             return at_speed(2.0).table
         if self.story == RANDOM:
             model = EncounterModel.load()
-            plan = Station("hold", robot).floor_plan
+            plan = Station("hold", robot, furniture=self.cell or None).floor_plan
             return model.encounter(model.random(self.seed), plan).table
         return load_story(self.story, floor=floor).table
 

@@ -12,6 +12,7 @@ import socket
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -163,11 +164,13 @@ def scene_of(robot: str, experiment: str | None = None, cell: Path | None = None
     from qpsafe.sensing.cell_file import load_cell
     from qpsafe.sim.experiments.by_name import experiment_loop
     from qpsafe.sim.experiments.fixed.stage import robot_stage
-    from qpsafe.sim.world.known import furnished
+    from qpsafe.sim.world.furniture import add_obstacles
     from qpsafe.sim.world.scene import build_scene
 
     found = load_robot(robot)
     if experiment is not None:
         return experiment_loop(experiment, found)[0].scene
     known = () if cell is None else load_cell(cell)
-    return build_scene(found, pedestal=robot_stage(found).pedestal, people=(), furnish=furnished(known))
+    return build_scene(
+        found, pedestal=robot_stage(found).pedestal, people=(), furnish=partial(add_obstacles, obstacles=known)
+    )

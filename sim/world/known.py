@@ -1,9 +1,6 @@
-"""What the robot's cell holds by plan: a scene's furniture as known obstacles, and known obstacles as furniture."""
+"""What the robot's cell holds by plan: a scene's furniture as known obstacles; `furniture.py` has the way back."""
 
 from __future__ import annotations
-
-from collections.abc import Callable, Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,22 +10,6 @@ from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sim.world.scene import SCENERY, Scene
 
 FLOOR = (6.0, 6.0, 0.5)  # the floor as a slab: as far as any spot could look, and thick [m]
-WOOD = (0.72, 0.62, 0.50, 1.0)  # colour of furniture
-
-
-def furnished(known: Sequence[Obstacle]) -> Callable[[Any], None]:
-    """A `furnish` for `build_scene`: known obstacles stand in the scene, each as its convex hull."""
-
-    def furnish(spec: Any) -> None:
-        for k, obstacle in enumerate(known):
-            name = f"known/{k}"
-            spec.add_mesh(name=name, uservert=obstacle.vertices.ravel())
-            spec.worldbody.add_geom(
-                name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=WOOD, group=SCENERY,
-                contype=0, conaffinity=0,
-            )  # fmt: skip
-
-    return furnish
 
 
 def known_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
@@ -67,11 +48,6 @@ def known_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
             ring = np.stack((outer * np.cos(angle), outer * np.sin(angle)), axis=1)
             corners = np.vstack([np.column_stack((ring, np.full(48, z))) for z in (-size[1], size[1])])
             found.append(Obstacle(name, corners @ pose[:3, :3].T + pose[:3, 3]))
-        elif shape == kind.mjGEOM_MESH:
-            mesh = model.mesh(int(model.geom_dataid[geom]))
-            first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-            vertices = model.mesh_vert[first : first + count].astype(float)
-            found.append(Obstacle(name, vertices @ pose[:3, :3].T + pose[:3, 3]))
         else:
             raise ValueError(f"scenery geom {name} has no hull here: add its shape to sim/world/known.py")
     found.extend(Obstacle(name, np.vstack(vertices)) for name, vertices in bodies.items())

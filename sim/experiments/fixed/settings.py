@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from qpsafe.errors import RobotFileError
 from qpsafe.laws.problem import Law
 from qpsafe.recovery.returns import RecoveryRules
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.shared.control import Control
 from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.ranging.sets import range_sensors, sensor_kinds
+from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 
@@ -49,6 +51,7 @@ class FixedSettings(Control):
         choreography: How the person moves; `seed` varies it. By default as the robot's stage says (`sim.robot_stage`).
         recovery: How the robot returns to its path; None for the default, see above.
         story: Who does what instead of the choreography; `seed` varies it too.
+        cell: Furniture besides the pedestal: it stands in the scene, and the controller knows it.
     """
 
     robot: Robot
@@ -63,6 +66,7 @@ class FixedSettings(Control):
     choreography: Choreography = None  # type: ignore[assignment]  # set below: it depends on the robot
     recovery: RecoveryRules | None = None
     story: Story | None = None
+    cell: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -90,7 +94,8 @@ class FixedSettings(Control):
     def scene(self) -> Scene:
         """The world, built on first use."""
         floor = self.choreography.person.floor if self.story is None else self.story.floor
-        return build_scene(self.robot, pedestal=-floor, people=self.walk.persons)
+        furnish = partial(add_obstacles, obstacles=self.cell)
+        return build_scene(self.robot, pedestal=-floor, people=self.walk.persons, furnish=furnish)
 
     @cached_property
     def walk(self) -> Choreography | Story:

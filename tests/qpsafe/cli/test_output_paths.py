@@ -53,6 +53,7 @@ def test_the_outputs_are_those_of_all_commands() -> None:
         *(("calibrate", name) for name in ("out", "plot")),
         *(
             ("bench", "out"),
+            ("calibrate-camera", "out"),
             ("check", "out"),
             ("tune", "out"),
             ("add", "out"),

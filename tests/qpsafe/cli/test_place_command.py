@@ -14,6 +14,7 @@ import qpsafe
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement import candidates
+from qpsafe.placement.sensors import Sensor
 from qpsafe.robot.robot import Robot
 
 
@@ -26,12 +27,12 @@ def _nodes_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @cache
-def _found_by_name(name: str) -> candidates.Candidates:
-    return _find(qpsafe.load_robot(name), spacing=0.1265)
+def _found_by_name(name: str, sensor: Sensor) -> candidates.Candidates:
+    return _find(qpsafe.load_robot(name), spacing=0.1265, sensor=sensor)
 
 
-def _found(robot: Robot, wanted: int, **options: Any) -> candidates.Candidates:
-    return _found_by_name(robot.name) if wanted == 40 else _find(robot, wanted, **options)
+def _found(robot: Robot, wanted: int, sensor: Sensor, **options: Any) -> candidates.Candidates:
+    return _found_by_name(robot.name, sensor) if wanted == 40 else _find(robot, wanted, sensor=sensor, **options)
 
 
 _find = candidates.candidate_nodes
@@ -60,15 +61,33 @@ def test_a_placement_is_written_and_loads(tmp_path: Path) -> None:
         assert all(a <= p <= b for a, p, b in zip(low, curve["probability"][1], high, strict=True))
 
 
+def test_arrays_are_placed_and_load(tmp_path: Path) -> None:
+    result = run("--sensor", "vl53l5cx", "--objective", "nearest", "--spots", "6", "--json", "--out", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    assert (report["sensor"], report["wanted"]) == ("VL53L5CX", "nearest")
+    sensors = qpsafe.load_range_sensors("irb140", tmp_path / "spots-vl53l5cx.toml")
+    assert sorted(sensor.name for sensor in sensors) == sorted(report["placements"]["nearest"]["spots"])
+    assert {sensor.shape for sensor in sensors} == {(8, 8)}
+    assert not (tmp_path / "spots.toml").exists()
+    for curve in report["curves"].values():
+        for near, detected in zip(curve["nearest"], curve["probability"], strict=True):
+            assert near == sorted(near)
+            assert all(a <= b for a, b in zip(near, detected, strict=True))
+    best = report["placements"]["nearest"]
+    assert best["optimised_sample"]["nearest"] == pytest.approx(best["value"] / report["pairs"])
+
+
+@pytest.mark.parametrize("file", ["spots.toml", "spots-vl53l5cx.toml"])
 @pytest.mark.slow
-def test_the_bundled_spots_are_what_the_command_at_their_head_makes(tmp_path: Path) -> None:
-    bundled = (qpsafe.load_robot("irb140").folder / "spots.toml").read_text(encoding="utf-8")
+def test_the_bundled_spots_are_what_the_command_at_their_head_makes(file: str, tmp_path: Path) -> None:
+    bundled = (qpsafe.load_robot("irb140").folder / file).read_text(encoding="utf-8")
     command = bundled.replace("\n# ", " ").partition("`")[2].partition("`")[0]
     name, *arguments = command.split()
     assert name == "qpsafe"
     result = CliRunner().invoke(app, [*arguments, "--no-pictures", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
-    assert (tmp_path / "spots.toml").read_text(encoding="utf-8") == bundled
+    assert (tmp_path / file).read_text(encoding="utf-8") == bundled
 
 
 def test_fewest_spots_for_a_probability(tmp_path: Path) -> None:

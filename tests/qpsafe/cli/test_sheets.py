@@ -22,6 +22,7 @@ import qpsafe.cli
 from qpsafe.cli import (
     bench,
     calibrate,
+    calibrate_camera,
     check,
     common,
     compare,
@@ -83,6 +84,14 @@ def of_calibration(screen: Console, folder: Path) -> None:
     curve, distances = SharpCurve(), np.linspace(0.2, 0.8, 120)
     fits = [Fit(f"{name} {HOSTILE}", curve, distances, curve.voltage(distances + 0.1), 117) for name in "ab"]
     calibrate._show(fits, 0.01, screen)
+
+
+def of_camera(screen: Console, folder: Path) -> None:
+    from qpsafe.ranging.extrinsics.calibrate import CameraCalibration
+
+    weak = ("translation along (0.00, 0.00, 1.00)", f"the robot {HOSTILE}")
+    found = CameraCalibration(np.eye(4), 1e-6 * np.eye(6), 0.0123, 0.987, 0.0123, 12345, 123, np.zeros(3), weak)
+    calibrate_camera._show(HOSTILE, found, 0.01, screen)
 
 
 def of_check(screen: Console, folder: Path) -> None:
@@ -282,6 +291,7 @@ TABLES: dict[Callable[..., None], Show] = {
     bench.show: of_bench,
     bench.show_compilation: of_compilation,
     calibrate._show: of_calibration,
+    calibrate_camera._show: of_camera,
     check.show: of_check,
     campaign.show_table: of_campaign,
     campaign._show_differences: of_campaign,

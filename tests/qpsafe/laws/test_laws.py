@@ -24,7 +24,7 @@ def test_null_space_law_is_the_blend_of_three_regimes() -> None:
     for s in random_states(300, seed=5):
         regimes = regimes_of(s.problem().tasks, s.qd0)
         blend = (1 - s.m) * regimes[0] + s.m * (1 - s.f) * regimes[1] + s.m * s.f * regimes[2]
-        assert s.source_velocity() == pytest.approx(blend, abs=1e-10)
+        assert s.paper_velocity() == pytest.approx(blend, abs=1e-10)
 
 
 @given(state, unit)

@@ -1,4 +1,4 @@
-"""What a robot's file may state of its controllers, and the source's parameters beside it."""
+"""What a robot's file may state of its controllers, and the paper's parameters beside it."""
 
 from __future__ import annotations
 

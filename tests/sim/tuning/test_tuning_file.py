@@ -38,7 +38,7 @@ def test_what_is_written_loads_as_the_same_controller(name: str, tmp_path: Path)
         assert getattr(loaded.recovery_rules, key) == pytest.approx(getattr(made["recovery"], key), rel=1e-12)
     for key in TABLES["gate"]:
         assert getattr(loaded.gate, key) == getattr(made["gate"], key)
-    # the source's are there as before
+    # the paper's are there as before
     assert present(qpsafe.load_robot(folder, parameters="paper")) == present(robot)
     # everything else stays
     before, after = (tomllib.loads((f / "robot.toml").read_text(encoding="utf-8")) for f in (robot.folder, folder))

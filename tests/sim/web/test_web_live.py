@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.by_name import LAWS, PROJECTIONS
-from qpsafe.robot.loader import bundled_robots
+from qpsafe.robot.loader import bundled_robots, load_robot
 from qpsafe.sim.recording.run_file import read_run
 from qpsafe.sim.replay.replay import replay
 from qpsafe.sim.web.live import Live, Wish
@@ -175,7 +175,33 @@ def test_a_recording_replays_bit_by_bit(tmp_path: Path) -> None:
     assert (found.same, found.ticks) == (True, 200)
 
 
+def test_furniture_of_a_cell_stands_there_and_is_known(tmp_path: Path) -> None:
+    """A program leads the tool down, into a table if there is one: it stops above it. Recordings replay."""
+    robot = load_robot("irb140")
+    x, y, z = (float(value) for value in robot.pose("tcp", robot.home)[:3, 3])
+    cell, program = tmp_path / "cell.toml", tmp_path / "down.toml"
+    cell.write_text(f'[[box]]\nname = "table"\nsize = [0.4, 0.6, 0.04]\ncentre = [{x}, {y}, {z - 0.06}]\n')
+    program.write_text(
+        f"[points]\ndown = {{ position = [{x}, {y}, {z - 0.1}] }}\n[[segment]]\ndo = 'line'\nto = 'down'\n"
+    )
+    bare, furnished = (Live(Setup(task=str(program), cell=file), tmp_path) for file in ("", str(cell)))
+    assert furnished.experiment.scene.model.ngeom == bare.experiment.scene.model.ngeom + 1
+    for live, low in ((bare, z - 0.1), (furnished, z - 0.036)):
+        live.follow(live.wish._replace(drag=Drag(AWAY)))
+        last = ticks(live, 500)[-1]
+        assert robot.pose("tcp", last.reference.q)[2, 3] == pytest.approx(low, abs=5e-4)
+
+    live = Live(Setup(cell=str(cell)), tmp_path)
+    live.follow(live.wish._replace(record=True))
+    ticks(live, 100)
+    live.follow(live.wish._replace(record=False))
+    cell.unlink()  # what is recorded needs it no more
+    (path,) = tmp_path.glob("*.npz")
+    assert replay(read_run(path)).same
+
+
 REFUSED = [
+    {"setup": Setup(cell="no-such-file.toml")},
     {"setup": Setup(robot="no such robot")},
     {"setup": Setup(task="no-such-file.toml")},
     {"setup": Setup(story="no-such-file.toml")},

@@ -6,6 +6,7 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +24,8 @@ from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sim.web.bodies import Bodies
 from qpsafe.sim.web.frame import EVERY
 from qpsafe.sim.web.watch import Watch, scene_of
-from qpsafe.sim.world.known import furnished, known_obstacles
+from qpsafe.sim.world.furniture import add_obstacles
+from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import build_scene
 
 ROBOT = qpsafe.load_robot("irb140")
@@ -153,9 +155,11 @@ def test_what_is_drawn_is_what_is_known() -> None:
         Obstacle.box("table", (0.8, 1.2, 0.05), (0.9, 0.1, 0.1)),
         Obstacle("ramp", np.array([[1, 0, 0], [1, 0.4, 0], [1.4, 0, 0], [1.4, 0.4, 0.3]])),
     )
-    found = known_obstacles(build_scene(ROBOT, people=(), furnish=furnished(known)))
+    found = known_obstacles(build_scene(ROBOT, people=(), furnish=partial(add_obstacles, obstacles=known)))
     here = {obstacle.name: obstacle.vertices for obstacle in found}
     rng = np.random.default_rng(3)
     for k, obstacle in enumerate(known):
         for way in rng.normal(size=(200, 3)):  # convex hulls are equal if they reach equally far everywhere
-            assert np.isclose((here[f"known/{k}"] @ way).max(), (obstacle.vertices @ way).max(), atol=1e-6)
+            assert np.isclose(
+                (here[f"cell {k} {obstacle.name}"] @ way).max(), (obstacle.vertices @ way).max(), atol=1e-6
+            )

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.ranging import prediction
-from qpsafe.ranging.prediction import Foresight
+from qpsafe.ranging.tracking import prediction
+from qpsafe.ranging.tracking.prediction import Foresight
 
 number = st.floats(-1.0, 1.0)
 poses = st.lists(st.floats(-1.2, 1.2), min_size=6, max_size=6).map(np.array)

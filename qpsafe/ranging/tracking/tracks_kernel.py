@@ -1,4 +1,4 @@
-"""Motion of clusters of points between images, compiled: see `qpsafe.ranging.tracks`."""
+"""Motion of clusters of points between images, compiled: see `qpsafe.ranging.tracking.tracks`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from math import isfinite, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, entry, inline, readable
-from qpsafe.ranging import clusters as clusters_module
-from qpsafe.ranging.clusters import best_shift, certain_part, gather, is_there, join, parent_of, squared
+from qpsafe.ranging.tracking import clusters as clusters_module
+from qpsafe.ranging.tracking.clusters import best_shift, certain_part, gather, is_there, join, parent_of, squared
 from qpsafe.robot.kinematics import Index
 
 #: Images that are remembered.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.ranging.tracks import PointTracks, sweep
+from qpsafe.ranging.tracking.tracks import PointTracks, sweep
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.ranging.tracks import PointTracks, sweep
+from qpsafe.ranging.tracking.tracks import PointTracks, sweep
 
 seeds = st.integers(0, 2**32 - 1)
 rates = st.sampled_from([5.0, 15.0, 30.0, 60.0, 250.0])

@@ -1,6 +1,6 @@
 """How clusters of points move from image to image: what is known of it for certain.
 
-A velocity is used where it raises danger only (`qpsafe.ranging.prediction`). So what counts is that nothing at rest
+A velocity is used where it raises danger only (`prediction`). So what counts is that nothing at rest
 seems to move; what moves may seem slower than it is. Points of an image are clustered by single linkage, and each
 cluster has a parent: the cluster of the image before, moved on by its velocity, that explains it best. Followed back
 along its parents for a window, a cluster has moved by the smallest shift that explains it nearly as well, by distances
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.ranging.tracks_kernel import IMAGES, track
+from qpsafe.ranging.tracking.tracks_kernel import IMAGES, track
 
 
 class PointTracks(Fixed):

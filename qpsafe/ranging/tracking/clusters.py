@@ -1,4 +1,4 @@
-"""Clusters of points and the shifts between them, compiled: what `qpsafe.ranging.tracks` is made of."""
+"""Clusters of points and the shifts between them, compiled: what `qpsafe.ranging.tracking.tracks` is made of."""
 
 from __future__ import annotations
 

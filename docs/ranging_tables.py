@@ -1,0 +1,50 @@
+"""Tables of what arrays and cameras see, for campaign_tables.py."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import Any
+
+from demo_tables import lines
+from noted import measured
+
+
+def share(probability: float, low: float, high: float) -> str:
+    """A share and its limits in per cent."""
+    return f"{100 * probability:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def place_arrays() -> str:
+    """Spots and arrays as they are bundled, and fewer arrays, by detection and by the nearest part."""
+    judged = {name: measured(f"place-{name}") for name in ("caps", "arrays")}
+    keys = (("probability", "low", "high"), ("nearest", "nearest_low", "nearest_high"))
+
+    def bundled(what: str, found: dict[str, Any]) -> tuple[str, ...]:
+        own = found["placements"][found["wanted"]]["independent_sample"]
+        return what, *(share(*(own[key] for key in three)) for three in keys), f"{100 * own['danger']:.0f} %"
+
+    rows = [bundled("20 Sharps, as bundled", judged["caps"])]
+    for objective, counts in (("detection", (8, 12, 20)), ("nearest", (8, 12))):
+        curve = judged["arrays"]["curves"][objective]
+        for k in counts:
+            seen = share(curve["probability"][1][k], *(side[k] for side in curve["confidence"]))
+            near = share(curve["nearest"][1][k], *(side[k] for side in curve["nearest_confidence"]))
+            rows.append((f"{k} arrays by `{objective}`", seen, near, f"{100 * curve['danger'][1][k]:.0f} %"))
+    rows.append(bundled("20 arrays by `nearest`, as bundled", judged["arrays"]))
+    return lines(("sensors", "detected", "nearest part seen", "danger measured"), rows)
+
+
+def camera_calibration() -> str:
+    """How well simulated cameras are found, a line a robot."""
+    rows = []
+    for robot, found in measured("camera-calibration")["robots"].items():
+        good = [run for run in found if run["good"]]
+        cells = [
+            f"{median(run[key] for run in good):{form}} ({max(run[key] for run in good):{form}}) {unit}"
+            for key, form, unit in (("place", ".0f", "mm"), ("angle", ".2f", "°"), ("middle", ".1f", "mm"))
+        ]
+        rows.append((f"`{robot}`", *cells, f"{len(good)} of {len(found)}"))
+    return lines(("robot", "camera's place", "its direction", "a place at the robot", "called good"), rows)
+
+
+TABLES = {"place-arrays": place_arrays, "camera-calibration": camera_calibration}

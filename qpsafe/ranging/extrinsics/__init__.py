@@ -1,0 +1,1 @@
+"""Where a camera that is fixed in space is: found by the robot's own motion in its view."""

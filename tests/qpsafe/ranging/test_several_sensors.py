@@ -1,0 +1,80 @@
+"""What one sensor sees free, what another sees occupied, and what none of them sees."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from qpsafe.ranging.rules import RangeRules
+from qpsafe.ranging.sensor import RangeSensor
+from qpsafe.sensing.rules import SensingRules
+
+DT = 0.004
+# the images of these tests do not show the robot
+BLIND_TO_ITSELF = SensingRules(self_detection=False)
+BALL = (0.75, 0.2, 0.5, 0.12)
+
+
+@pytest.fixture
+def pair(eyes: Any) -> list[RangeSensor]:
+    """Two arrays that look at a ball beside the robot from two sides."""
+    places = {"left": (0.75, 1.2, 0.6), "front": (1.9, 0.2, 0.6)}
+    return [
+        RangeSensor.array(name, 16, 16, np.radians(50.0), pose=eyes.looking(BALL[:3], place), sigma=0.005)
+        for name, place in places.items()
+    ]
+
+
+def near(tick: Any) -> int:
+    """How many places are known on the ball."""
+    return int((np.linalg.norm(tick.near - BALL[:3], axis=1) < 0.2).sum())
+
+
+def test_what_one_sees_free_does_not_delete_what_another_sees(run: Any, eyes: Any, pair: list[RangeSensor]) -> None:
+    """The left one sees through the ball, by an error of its own: the front one sees it still, so it is there."""
+    loop = run(spots="off", range_sensors=pair, sensing=BLIND_TO_ITSELF)
+    for k in range(60):
+        images = []
+        if k % 10 == 0:
+            left, front = (eyes.seen(sensor, sensor.pose, [BALL]) for sensor in pair)
+            left = np.full(256, np.inf) if k >= 20 else left
+            images = [pair[0].image(left, stamp=k * DT), pair[1].image(front, stamp=k * DT)]
+        tick = loop.feed(loop.q, loop.qd, images=images)
+    assert near(tick) > 0
+    assert tick.cdf_n > 0.0
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_what_is_lost_is_forgotten_at_once_where_another_looks_through_it(
+    run: Any, eyes: Any, pair: list[RangeSensor], free: bool
+) -> None:
+    """The left one cannot tell any more what is where the ball was; the front one sees that nothing is, or is blind."""
+    loop, known = run(spots="off", range_sensors=pair, sensing=BLIND_TO_ITSELF), []
+    seen = eyes.seen(pair[0], pair[0].pose, [BALL])
+    for k in range(30):
+        valid = ~np.isfinite(seen) if k >= 20 else None
+        clear = None if free else np.arange(256) == 0
+        images = [
+            pair[0].image(seen, stamp=k * DT, valid=valid),
+            pair[1].image(np.full(256, np.inf), stamp=k * DT, valid=clear),
+        ]
+        known.append(near(loop.feed(loop.q, loop.qd, images=images)))
+    assert known[19] > 0
+    assert (known[24] == 0) == free
+
+
+def test_behind_things_somebody_may_stand_if_that_is_asked_for(run: Any, eyes: Any) -> None:
+    camera = RangeSensor.array("camera", 24, 24, np.radians(80.0), pose=eyes.looking((0.4, 0.0, 0.5), (2.4, 0.0, 0.9)))
+    board = [(1.2, 0.25 * y, 0.35 + 0.25 * z, 0.2) for y in (-2, -1, 0, 1, 2) for z in (0, 1, 2, 3)]
+    found = {}
+    for rules in (RangeRules(), RangeRules(unseen="occupied")):
+        for name, things in (("nothing", []), ("board", board)):
+            loop = run(spots="off", range_sensors=[camera], ranging=rules)
+            read = eyes.seen(camera, camera.pose, things)
+            tick = loop.feed(loop.q, loop.qd, images=[camera.image(read, stamp=0.0)])
+            beyond = tick.near[:, 0] < 0.8 if len(tick.near) else np.zeros(0, dtype=bool)
+            found[rules.unseen, name] = int(beyond.sum())
+    assert found["free", "nothing"] == found["free", "board"] == 0
+    assert found["occupied", "board"] > found["occupied", "nothing"] + 20
