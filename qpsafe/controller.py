@@ -47,13 +47,14 @@ from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.speed_cap import slowed
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
-from qpsafe.tasks.task import Task, errors_of
+from qpsafe.tasks.task import Task
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 _WAY_LAW = HierarchicalLaw()
+_SILENT: tuple[str, ...] = ()
 
 
 class SafetyController(Running):
@@ -232,7 +233,7 @@ class SafetyController(Running):
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
-        gated, gate, doubts = PASSED, self.verifies, tuple[str, ...]()
+        gated, gate, doubts = PASSED, self.verifies, _SILENT
         if gate is not None:
             command, doubts = command.copy(), gate.notes()
             gated = gate(self._q, self._qd, command, seen.points, old)
@@ -258,7 +259,7 @@ class SafetyController(Running):
             task_names=self._labels,
             gate=gated,
             resolved=resolved,
-            off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
+            off_path=None if recovery.on_path else recovery.errors(commanded),
         )
 
     def _brake(self, status: str, message: str) -> Tick:
