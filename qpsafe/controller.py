@@ -30,7 +30,6 @@ from qpsafe.pipeline.checks import (
     checked_law,
     checked_recovery,
     checked_robot,
-    checked_spots,
 )
 from qpsafe.pipeline.resolve import Resolved, judged
 from qpsafe.pipeline.running import Running
@@ -43,14 +42,14 @@ from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
 from qpsafe.sensing.speed_cap import slowed
-from qpsafe.sensing.spots import SpotArray, load_spots
-from qpsafe.sensing.units import UnitWatch
+from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
+    from qpsafe.ranging.rules import RangeRules
+    from qpsafe.ranging.sensor import RangeImage, RangeSensor
     from qpsafe.robot.robot import Robot
 
 _WAY_LAW = HierarchicalLaw()
@@ -69,7 +68,10 @@ class SafetyController(Running):
         activation: Thresholds of the tasks; the robot's for one or two tasks (the paper's on the IRB 140).
         evasion: The admittance (16); `Evasion.for_robot` by default, "paper" for M = 4, D = 20.
         limits: Joint limits, by default the robot's; "off" switches them off (to compare laws, never on a robot).
-        spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any.
+        spots: The distance sensors, needed for `step(q, qd, distances)`; by default the robot's own, if it has any;
+            "off" for none.
+        range_sensors: Sensors of many zones, on the robot or fixed in space, whose images `step` is given.
+        ranging: What of their images counts.
         sensing: What counts as danger, and what sick sensors do.
         known: Known obstacles of the surroundings: points on them are no danger.
         carried: What tools may carry, keyed by the frame it is fixed to, in that frame's axes: part of the robot.
@@ -98,7 +100,9 @@ class SafetyController(Running):
         activation: Activation | None = None,
         evasion: Evasion | str | None = None,
         limits: JointLimits | str | None = None,
-        spots: SpotArray | None = None,
+        spots: SpotArray | str | None = None,
+        range_sensors: Sequence[RangeSensor] = (),
+        ranging: RangeRules | None = None,
         sensing: SensingRules | None = None,
         known: Sequence[Obstacle] = (),
         carried: Mapping[str, Sequence[Obstacle]] | None = None,
@@ -118,22 +122,15 @@ class SafetyController(Running):
         self._activation = checked_activation(self._tasks, activation, robot)
         self.evasion = evasion
         self.limits = limits
-        self._spots = load_spots(robot) if spots is None else checked_spots(spots, robot)
-        self._rules = SensingRules(**dict(robot.tuned.sensing)) if sensing is None else sensing
-        check_surroundings(robot, self._rules, known, carried)
-        self._sensing: DistanceSensing | None = None
-        if self._spots is not None:
-            self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)
-        self._units = UnitWatch(self._spots, self._dt)
+        self._set_sensors(spots, sensing, range_sensors, ranging, known, carried)
         self.barrier, self.gate, self.separation = barrier, gate, separation
-        self._known, self._carried = tuple(known), carried
         self.clearance = "off" if self._limits is None and clearance is None else clearance
         self._recovery_rules = (
             RecoveryRules(**dict(robot.tuned.recovery)) if recovery is None else checked_recovery(recovery)
         )
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
-        self._stages.sense(self._sensing, self._field, self._evasion)
+        self._stages.sense(self._sensing, self._field, self._evasion, self._ranging)
         self._stages.resolve(self._tasks, self._law)
         _ = self.verifies  # what it measures by is made here
         self.reset()
@@ -146,6 +143,8 @@ class SafetyController(Running):
         *,
         points: ArrayLike | None = None,
         ages: ArrayLike | None = None,
+        images: Sequence[RangeImage] | None = None,
+        now: float | None = None,
     ) -> Tick:
         """One tick. Never raises on data: what cannot be used is reported, and the robot brakes and holds.
 
@@ -156,6 +155,8 @@ class SafetyController(Running):
                 what is below zero are sick. An array (p, 3) is taken as `points`.
             points: Detected points (p, 3) instead, world frame [m]; each belongs to the wire link nearest to it.
             ages: How old the distances are, (k,) or one number [s]; fresh by default. Points have none.
+            images: Of `range_sensors`, those that came since the last tick, late and out of step as they are.
+            now: Present time on the clock of their stamps [s]; by default this tick's, `dt` times its number from 0.
 
         Returns:
             The tick, with the joint reference to send.
@@ -163,7 +164,7 @@ class SafetyController(Running):
         start = time.perf_counter()
         clocks = self._recovery.clocks
         try:
-            tick = self._plan(q, qd, distances, points, ages)
+            tick = self._plan(q, qd, distances, points, ages, images, now)
         except BaseException as error:
             self._recovery.clocks = clocks  # the path waits for a robot that cannot go along
             if isinstance(error, BadInput):
@@ -172,10 +173,7 @@ class SafetyController(Running):
                 tick = self._brake(FAULT, in_words(error))
             else:  # somebody ends the program: nothing has moved
                 raise
-        if self._sensing is not None:
-            tick.severity, tick.unseen = self._sensing.health.severity, self._sensing.unseen
-            if self._units.odd:
-                tick.unseen = tuple(dict.fromkeys((*tick.unseen, *self._units.odd)))
+        tick.severity, tick.unseen = self._unseen()
         self._advance(tick.reference)
         tick.solve_time = time.perf_counter() - start
         return tick
@@ -187,6 +185,8 @@ class SafetyController(Running):
         distances: ArrayLike | None,
         points: ArrayLike | None,
         ages: ArrayLike | None,
+        images: Sequence[RangeImage] | None,
+        now: float | None,
     ) -> Tick:
         """All that may fail, and all that asks parts of the user's making; the command does not advance here."""
         if not self._active:  # the commanded configuration starts where the robot is
@@ -197,7 +197,8 @@ class SafetyController(Running):
         barrier, separation, recovery = self._barrier, self._separation, self._recovery
 
         # distances -> detected points (7) -> danger (1)-(6) -> virtual torque (8), (14), (15) -> evasive velocity (16)
-        seen = self._stages.sense(self._sensing, self._field, self._evasion)(q, qd, distances, points, ages)
+        sense = self._stages.sense(self._sensing, self._field, self._evasion, self._ranging)
+        seen = sense(q, qd, distances, points, ages, images, self._clock(now), self._person_speed)
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
@@ -217,11 +218,11 @@ class SafetyController(Running):
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
-        limits, soft = self._limits, (*self._kept_clear(commanded), *self._kept_apart(q, seen.points, old))
+        limits, soft = self._limits, (*self._kept_clear(commanded), *self._kept_apart(q, seen, old))
         if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
-        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
+        given = (commanded, self._qd, self._qd_before, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)
         else:
@@ -236,7 +237,7 @@ class SafetyController(Running):
         gated, gate, doubts = PASSED, self.verifies, _SILENT
         if gate is not None:
             command, doubts = command.copy(), gate.notes()
-            gated = gate(self._q, self._qd, command, seen.points, old)
+            gated = gate(self._q, self._qd, command, seen.people, old, seen.leads)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
@@ -252,6 +253,7 @@ class SafetyController(Running):
             points=seen.points,
             links=seen.links,
             vectors=seen.vectors,
+            near=seen.near,
             path_time=recovery.path_time,
             events=recovery.due_events(),
             waits_for=recovery.waits_for,

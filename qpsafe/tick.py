@@ -53,6 +53,7 @@ class Tick:
         points: Detected points that counted, (p, 3), world frame [m].
         links: Wire link that each point belongs to, (p,), from 0.
         vectors: Danger vectors (6) at the points, (p, 3).
+        near: What range sensors saw near the robot, where they saw it, counted among the points or not (e, 3) [m].
         path_time: Clock of the tasks' trajectories [s].
         events: Names of the events that the tasks' programs reached at this tick, e.g. ``grip``.
         waits_for: Names of the tasks that the path waits for: in ``recovering``, or with an event due.
@@ -80,6 +81,7 @@ class Tick:
     points: NDArray[np.float64] = field(default_factory=_no_vectors)
     links: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     vectors: NDArray[np.float64] = field(default_factory=_no_vectors)
+    near: NDArray[np.float64] = field(default_factory=_no_vectors)
     path_time: float = 0.0
     events: tuple[str, ...] = ()
     waits_for: tuple[str, ...] = ()

@@ -22,6 +22,7 @@ hqp hqp.own limits robot
 hqp.backends tasks
 hqp.solve danger
 sensing
+ranging
 geometry
 gate
 laws recovery

@@ -155,7 +155,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(floats, at[37], (N + 2,)),
         view(integers, at[38], (sizes[15],)),
         view(integers, at[39], (3,)),
-        view(floats, at[40], (sizes[20] + sizes[21] * room,)),
+        view(floats, at[40], (sizes[20] + (sizes[21] + 1) * room,)),
         view(integers, at[41], (sizes[21] * room + 2,)),
     )
 

@@ -98,10 +98,11 @@ def sense(
     if too_many or (how == code.DISTANCES and not distances.shape[0] == ages.shape[0] == spots_count):
         return code.WRONG_SIZE
     s.marks[code.CAPPED] = 0
+    nobody, nowhere = view(w.points, 0, (0, 3)), view(w.links, 0, (0,))  # a batch takes no images
     if how == code.DISTANCES:
         count, dying, out, cdf_n = _sense_readings(
-            q, qd, distances, ages, f, i, s.counts, s.seen, spots[0], s.held, s.age, s.track, s.evasive,
-            w.sensing, w.points, w.links, w.danger, w.vectors, s.qd0,
+            q, qd, distances, ages, nobody, nowhere, nobody, f, i, s.counts, s.seen, spots[0], s.held, s.age, s.track,
+            s.evasive, w.sensing, w.points, w.links, w.danger, w.vectors, s.qd0,
         )  # fmt: skip
         if count < 0:
             return code.NO_MEASUREMENT
@@ -114,7 +115,7 @@ def sense(
     else:
         given_points = points.shape[0]
         count, cdf_n = _sense_points(
-            q, qd, points, f, i, s.evasive, w.sensing, view(w.points, 0, (given_points, 3)),
+            q, qd, points, nobody, nowhere, nobody, f, i, s.evasive, w.sensing, view(w.points, 0, (given_points, 3)),
             view(w.links, 0, (given_points,)), view(w.danger, 0, (given_points,)),
             view(w.vectors, 0, (given_points, 3)), s.qd0,
         )  # fmt: skip

@@ -87,7 +87,7 @@ def _plan(
     if p.gate.shape[0] > 0:
         _let_through(
             p.gate, p.gate_whole, s.gate_known, w.gate, w.gate_whole, s.q, s.qd, w.command,
-            view(w.points, 0, (s.marks[code.COUNT], 3)), ages, s.gated,
+            view(w.points, 0, (s.marks[code.COUNT], 3)), ages, view(w.points, 0, (0,)), s.gated,
         )  # fmt: skip
         if s.gated[SHORT] > WORTH_SAYING:
             notes |= code.TOO_NEAR

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.fixed import Fixed
 from qpsafe.gate import workspace
 from qpsafe.gate.gate_kernel import CAUSE, PERSON_NEAR, POINT, SHARE, SHORT, TOLD, WHO, let_through
-from qpsafe.gate.gated import PASSED, Gated
+from qpsafe.gate.gated import NO_AGES, PASSED, Gated
 from qpsafe.gate.pack import bare_links, pack, robot_capsules, surroundings
 from qpsafe.gate.rules import VerifiedMotion
 
@@ -52,7 +52,9 @@ class Gate(Fixed):
         self._known = np.full(len(self.groups) * (1 + robot.nq), np.nan)  # nothing has been measured
         self._unsaid = True
 
-    def __call__(self, q: Array, qd: Array, command: Array, points: Array, ages: Array) -> Gated:
+    def __call__(
+        self, q: Array, qd: Array, command: Array, points: Array, ages: Array, leads: Array = NO_AGES
+    ) -> Gated:
         """Replace a command (n,) [rad/s] by the part of it that can be let through.
 
         Args:
@@ -61,10 +63,11 @@ class Gate(Fixed):
             command: The next one, inside the box of the limits; changed in place.
             points: Where people were seen (p, 3) [m].
             ages: How old the readings are, of every spot (k,) [s]; none where they have none.
+            leads: Of the last e points, which no spot saw: how long before now they were there, at least 0 (e,) [s].
         """
         if len(points) > self._room:
             self._make_room(len(points))
-        share = let_through(*self.blocks, self._known, *self._work, q, qd, command, points, ages, self._told)
+        share = let_through(*self.blocks, self._known, *self._work, q, qd, command, points, ages, leads, self._told)
         return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
 
     def notes(self) -> tuple[str, ...]:

@@ -37,13 +37,13 @@ USES = (
 
 
 @inline
-def _passes(t, w, known, q, v, points, age, told):  # type: ignore[no-untyped-def]
+def _passes(t, w, known, q, v, points, told):  # type: ignore[no-untyped-def]
     """Whether a command's way passes; if not, what is in its way is told."""
     group = touched(t, w, known, q, v)
     if group >= 0:
         told[CAUSE], told[WHO], told[POINT] = SOLID_NEAR, group, w.found[7]
         return False
-    if points.shape[0] > 0 and people_excess(t, w, q, v, points, age, False) > 0.0:
+    if points.shape[0] > 0 and people_excess(t, w, q, v, points, False) > 0.0:
         told[CAUSE], told[WHO], told[POINT] = PERSON_NEAR, w.worst[0], w.worst[1]
         return False
     return True
@@ -75,13 +75,13 @@ _out = types.float64[::1]
 @entry(
     types.float64(
         _block, _whole, _out, _out, types.int64[::1], _block, _block, _out,
-        types.Array(types.float64, 2, "C", readonly=True), readable(1), _out,
+        types.Array(types.float64, 2, "C", readonly=True), readable(1), readable(1), _out,
     ),
     *USES,
 )  # fmt: skip
 def let_through(
     floats: Array, integers: Index, own: Array, work: Array, whole: Index, q: Array, qd: Array, command: Array,
-    points: Array, ages: Array, told: Array,
+    points: Array, ages: Array, leads: Array, told: Array,
 ) -> float:  # fmt: skip
     """Replace the command by the part of it that can be let through; returns the share λ.
 
@@ -92,7 +92,8 @@ def let_through(
         q, qd: Where the robot is commanded to be, and its commanded velocity (n,) [rad, rad/s].
         command: (n,) [rad/s], inside the box of the joint limits.
         points: Seen (p, 3) [m].
-        ages: Of readings (k,) [s].
+        ages: Of the readings that told of the first points (k,) [s].
+        leads: Of the last e points, how long before now they were where they are (e,) [s].
         told: See above.
     """
     n, c, g = q.shape[0], integers[CAPSULES], integers[GROUPS]
@@ -100,7 +101,9 @@ def let_through(
     w = by_reference(workspace.workspace(work, whole, n, c, integers[SHAPES], integers[PAIRS], points.shape[0]))
     known = view(own, 0, (g, 1 + n))
     told[SHARE], told[CAUSE], told[WHO], told[POINT], told[SHORT] = 1.0, 0.0, -1.0, -1.0, 0.0
-    age = _oldest(ages, t.numbers[MAX_AGE])
+    oldest, first = _oldest(ages, t.numbers[MAX_AGE]), points.shape[0] - leads.shape[0]
+    for k in range(points.shape[0]):
+        w.ages[k] = oldest if k < first else leads[k - first]
     _within(t, w, q, points)
     slow_down(qd, t.acceleration, t.numbers[DT], w.brake)
     low, high, share = 0.0, 1.0, 1.0
@@ -108,7 +111,7 @@ def let_through(
     for step in range(BISECTIONS + 1):
         for j in range(n):
             w.trial[j] = command[j] if step == 0 else w.brake[j] + share * (command[j] - w.brake[j])
-        if _passes(t, w, known, q, w.trial, points, age, told):
+        if _passes(t, w, known, q, w.trial, points, told):
             if step == 0:
                 return 1.0
             low = share
@@ -122,7 +125,7 @@ def let_through(
         for option in range(2):
             for j in range(n):
                 w.trial[j] = w.brake[j] if option == 0 else command[j]
-            excess = people_excess(t, w, q, w.trial, points, age, True)
+            excess = people_excess(t, w, q, w.trial, points, True)
             if option == 0:
                 told[SHORT] = excess
             elif excess < told[SHORT] and touched(t, w, known, q, command) < 0:

@@ -104,9 +104,9 @@ def _largest(along: float, b: float, turning: float, distance: float, u: float) 
 
 
 @inline
-def _hot(t: Any, v: Array, points: int, age: float, away: Array, hot: Index) -> int:
+def _hot(t: Any, v: Array, ages: Array, away: Array, hot: Index) -> int:
     """Pairs that have to be looked at along the way of a command, into `hot`; returns how many."""
-    n, dt, count = v.shape[0], t.numbers[DT], 0
+    n, points, dt, count = v.shape[0], ages.shape[0], t.numbers[DT], 0
     for c in range(t.radii.shape[0]):
         sweep, ticks = 0.0, 0
         for j in range(n):
@@ -115,31 +115,30 @@ def _hot(t: Any, v: Array, points: int, age: float, away: Array, hot: Index) -> 
                 sweep += t.levers[c, j] * abs(covered(v[j], t.acceleration[j], dt, 1e9))
         if sweep == 0.0:
             continue
-        reach = t.radii[c] + t.numbers[NEAR] + t.numbers[PERSON] * (age + ticks * dt) + sweep
+        reach = t.radii[c] + t.numbers[NEAR] + t.numbers[PERSON] * ticks * dt + sweep
         for k in range(points):
-            if not away[c * points + k] > reach:
+            if not away[c * points + k] > reach + t.numbers[PERSON] * ages[k]:
                 hot[count] = c * points + k
                 count += 1
     return count
 
 
 @inline
-def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float, to_the_end: bool) -> float:
+def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, to_the_end: bool) -> float:
     """By how much a command's way approaches people too fast: sum over ticks and pairs of what is above v_s, times dt.
 
     Args:
         t: `Tables`.
-        w: `Work`, with `away` of the configuration q, and `memory` and `axes` to work in.
+        w: `Work`, with `away` of the configuration q, `ages` of the points, and `memory` and `axes` to work in.
         q: Where the robot is (n,) [rad].
         v: The command (n,) [rad/s].
         points: Seen (p, 3) [m].
-        age: Of what was seen [s].
         to_the_end: Whether all of it is summed up; else the first excess is returned.
 
     The first capsule and point concerned are left in `w.worst`.
     """
     n, p, dt, v_s = q.shape[0], points.shape[0], t.numbers[DT], t.numbers[APPROACH]
-    count = _hot(t, v, p, age, w.away, w.hot)
+    count = _hot(t, v, w.ages, w.away, w.hot)
     excess, tick, person = 0.0, 0, t.numbers[PERSON]
     while count > 0:
         time = tick * dt
@@ -150,7 +149,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float,
             total += abs(w.speeds[j])
         stand(t, w.there, w.none, w.nowhere, w.memory)
         place_axes(t, w.memory, w.axes)
-        radius = t.numbers[NEAR] + person * (age + time + dt)  # at the end of the tick
+        radius = t.numbers[NEAR] + person * (time + dt)  # at the end of the tick, of what was seen now
         left, ahead = 0, MOST
         for h in range(count):
             pair = w.hot[h]
@@ -163,7 +162,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, age: float,
             w.hot[left] = pair
             left += 1
             distance, s = to_axis(w.axes[c], points[k])
-            gap = distance - t.radii[c] - radius - fastest * dt
+            gap = distance - t.radii[c] - radius - person * w.ages[k] - fastest * dt
             if gap >= 0.0:
                 ahead = min(ahead, 1 + int(min(gap / ((person + fastest) * dt), 1e6)))
                 continue

@@ -22,6 +22,7 @@ class Work(NamedTuple):
     away: Any  # distances of axes and points (c p,)
     pair: Any  # see `nearest_pair`
     found: Any  # likewise, and which of the group's pairs it was
+    ages: Any  # of the points (p,)
     nowhere: Any  # (0, 3)
     hot: Any  # pairs that have to be looked at (c p,)
     none: Any  # (0,)
@@ -38,7 +39,7 @@ def lengths(n: int, c: int, s: int, m: int, p: int) -> tuple[int, int]:
         m: Pairs of shapes.
         p: Points, at most.
     """
-    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + c * p + PAIR + 3 * s + m + 8, c * p + 2
+    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + c * p + PAIR + 3 * s + m + 8 + p, c * p + 2
 
 
 @inline
@@ -60,6 +61,7 @@ def workspace(floats: Any, integers: Any, n: int, c: int, s: int, m: int, p: int
         view(floats, d, (c * p,)),
         view(floats, e, (length,)),
         view(floats, e + length, (8,)),
+        view(floats, e + length + 8, (p,)),
         view(floats, 0, (0, 3)),
         view(integers, 0, (c * p,)),
         view(integers, 0, (0,)),

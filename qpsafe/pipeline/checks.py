@@ -21,7 +21,6 @@ from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
 from qpsafe.limits import KINDS, Box, JointLimits
 from qpsafe.recovery.returns import RecoveryRules
-from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
 from qpsafe.text.words import counted
 
@@ -172,14 +171,6 @@ def checked_recovery(rules: RecoveryRules) -> RecoveryRules:
     if not isinstance(rules, RecoveryRules):
         raise ConfigurationError("SafetyController", "recovery", rules, "RecoveryRules")
     return rules
-
-
-def checked_spots(spots: SpotArray, robot: Robot) -> SpotArray:
-    """`spots`, if this robot can carry them."""
-    if not isinstance(spots, SpotArray):
-        raise ConfigurationError("SafetyController", "spots", spots, "a SpotArray, e.g. qpsafe.load_spots(robot)")
-    spots.check(robot)
-    return spots
 
 
 def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:

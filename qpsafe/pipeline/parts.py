@@ -6,7 +6,7 @@ A part never changes, see `qpsafe.fixed`; another one may take its place, and co
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -31,34 +31,30 @@ from qpsafe.pipeline.checks import (
     checked_law,
     checked_separation,
 )
+from qpsafe.pipeline.sensors import Sensors
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
 from qpsafe.sensing.detection import as_joint_position
-from qpsafe.sensing.hulls import Obstacle
-from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.sensing.spots import SpotArray
-from qpsafe.sensing.units import UnitWatch
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.gate.gate import Gate
     from qpsafe.geometry.clearance_level import ClearanceLevel
+    from qpsafe.pipeline.sense import Seen
     from qpsafe.pipeline.stages import Stages
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
 
 
-class Parts:
+class Parts(Sensors):
     """The parts of a `SafetyController`.
 
-    Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `recovery_rules`, `recovery`; setting one is an
-    AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`, `gate`,
-    `clearance`, `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks by `set_tasks`.
+    Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `ranging`, `recovery_rules`, `recovery`; setting
+    one is an AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`,
+    `gate`, `clearance`, `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks by
+    `set_tasks`.
     """
 
-    _robot: Robot
-    _dt: float
     _tasks: tuple[Task, ...]
     _labels: tuple[str, ...]
     _law: Law
@@ -67,19 +63,12 @@ class Parts:
     _evasion: Evasion
     _limits: JointLimits | None
     _braking: JointLimits
-    _spots: SpotArray | None
-    _rules: SensingRules
-    _sensing: DistanceSensing | None
     _barrier: DangerBarrier | None
-    _gate: VerifiedMotion | None
     _separation: SeparationLimit | None
     _stages: Stages
     _clearance: ClearanceLimit | None
-    _known: Sequence[Obstacle]
-    _carried: Mapping[str, Sequence[Obstacle]] | None
     _recovery_rules: RecoveryRules
     _recovery: Recovery
-    _units: UnitWatch
     _qd: NDArray[np.float64]
     _qd_before: NDArray[np.float64]
 
@@ -152,21 +141,6 @@ class Parts:
         # braking must not depend on code of the user's: plain limits of the same numbers
         braking = JointLimits.of(self._robot, self._dt) if limits is None else limits.plain()
         self._limits, self._braking = limits, braking
-
-    @property
-    def spots(self) -> SpotArray | None:
-        """The distance sensors."""
-        return self._spots
-
-    @property
-    def rules(self) -> SensingRules:
-        """What counts as danger, and what sick sensors do."""
-        return self._rules
-
-    @property
-    def sensing(self) -> DistanceSensing | None:
-        """The sensors with what they remember."""
-        return self._sensing
 
     @property
     def barrier(self) -> DangerBarrier | None:
@@ -251,12 +225,6 @@ class Parts:
         )  # fmt: skip
         return copy.deepcopy(self, {id(part): part for part in shared})
 
-    def acknowledge(self) -> None:
-        """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""
-        if self._sensing is not None:
-            self._sensing.acknowledge()
-        self._units.acknowledge()
-
     def pause(self) -> None:
         """Bring the path's clock to rest within `recovery_rules.ramp`; danger is evaded as ever."""
         self._recovery.paused = True
@@ -282,11 +250,13 @@ class Parts:
         rows = self._kept_clear(commanded)
         return rows[0].nearer(2.0 * self._clearance.margin) if rows and self._clearance is not None else ()
 
-    def _kept_apart(self, measured: ArrayLike, points: NDArray[np.float64], ages: Any) -> tuple[SeparationLevel, ...]:
+    def _kept_apart(self, measured: ArrayLike, seen: Seen, ages: Any) -> tuple[SeparationLevel, ...]:
         """Rows that keep links from approaching what is seen too fast, at the measured position (n,) [rad]."""
         if self._separation is None:
             return ()
         state = self._robot.at(as_joint_position(measured, self._robot))
-        age = oldest(ages, self._rules.max_age)
-        rows = self._separation.level(state, self._stages.link_parts, points, age, qd=self._qd, limits=self._limits)
+        age = max(oldest(ages, self._rules.max_age), float(seen.leads.max(initial=0.0)))
+        rows = self._separation.level(
+            state, self._stages.link_parts, seen.people, age, qd=self._qd, limits=self._limits
+        )
         return () if rows is None else (rows,)

@@ -26,9 +26,7 @@ class Running(Parts):
         """Start anew: the next valid measurement sets the commanded configuration."""
         self._recovery = Recovery(self._tasks, self._activation.suspend_above, self._dt, self._recovery_rules)
         self._evasion.reset()
-        if self._sensing is not None:
-            self._sensing.reset()
-        self._units.reset()
+        self._reset_sensors()
         rules = self._recovery_rules
         self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)
         self._seq, self._active = -1, False

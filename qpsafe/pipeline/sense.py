@@ -1,6 +1,7 @@
 """The first half of a tick: from what was measured to the danger and the velocity that evades it.
 
     distances --(7), sensing rules--> points --(1)-(6)--> danger vectors --(8), (14), (15)--> torque --(16)--> q̇0
+    images --sensing rules, the most dangerous of each link and sensor--^
 
 One compiled call, see `qpsafe.pipeline.sense_kernel`. A field or an evasion of another making takes the place of its
 stage; the stages before it stay the compiled ones.
@@ -17,17 +18,32 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
+from qpsafe.gate.gated import NO_AGES
 from qpsafe.pipeline.checks import reals
 from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
+from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.robot.wire import Wire
-from qpsafe.sensing.detection import BadInput, as_floats, as_points, plausible, refuse, refuse_points
+from qpsafe.sensing.detection import (
+    BadInput,
+    as_floats,
+    as_joint_position,
+    as_joint_velocity,
+    as_points,
+    plausible,
+    refuse,
+    refuse_points,
+)
 from qpsafe.sensing.health import CLEAR
 from qpsafe.sensing.sensing import DistanceSensing
 
 if TYPE_CHECKING:
+    from qpsafe.ranging.ranging import RangeSensing
     from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
+
+
+_NOBODY, _NOWHERE = np.empty((0, 3)), np.empty(0, dtype=np.int64)
 
 
 class Seen(NamedTuple):
@@ -42,6 +58,8 @@ class Seen(NamedTuple):
         qd0: Evasive velocity q̇0 (n,) [rad/s].
         notes: What is wrong with the sensors, in words.
         capped: Whether the robot has to go slowly, since a sensor is dead.
+        near: What images show near the robot, where it was seen, counted above or not (e, 3) [m].
+        leads: For how long before now somebody could have come from there (e,) [s].
     """
 
     points: Array
@@ -52,6 +70,13 @@ class Seen(NamedTuple):
     qd0: Array
     notes: tuple[str, ...] = ()
     capped: bool = False
+    near: Array = _NOBODY
+    leads: Array = NO_AGES
+
+    @property
+    def people(self) -> Array:
+        """Where somebody was seen: by spots, or as points given, then by images (p + e, 3) [m]."""
+        return self.points if not len(self.near) else np.concatenate((self.points, self.near))
 
 
 class Sense:
@@ -62,10 +87,15 @@ class Sense:
         sensing: Its distance sensors, or None.
         field: The danger field.
         evasion: The admittance.
+        ranging: Its sensors of many zones, or None.
     """
 
-    def __init__(self, robot: Robot, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> None:
-        self.parts = sensing, field, evasion
+    def __init__(
+        self, robot: Robot, sensing: DistanceSensing | None, field: Any, evasion: Evasion,
+        ranging: RangeSensing | None = None,
+    ) -> None:  # fmt: skip
+        self.parts, self._ranging = (sensing, field, evasion, ranging), ranging
+        self._more = 0 if ranging is None else ranging.room
         self._robot, self._shape = robot, (robot.nq,)
         self._ours = type(field) is DangerField, type(evasion) is Evasion
         tables = {} if sensing is None else sensing.tables._asdict()
@@ -80,15 +110,16 @@ class Sense:
         self._still = np.zeros(robot.nq)
         self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
         self.blocks = pack(self._sizes, given, given)
-        self._work = np.empty(work_size(self._sizes, counts[0]))
+        self._work = np.empty(work_size(self._sizes, counts[0] + self._more))
 
     def __call__(
-        self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None, ages: ArrayLike | None
-    ) -> Seen:
-        """Sense one tick; arguments as for `SafetyController.step`.
+        self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None,
+        ages: ArrayLike | None, images: Any = None, now: float = 0.0, person: float = PERSON,
+    ) -> Seen:  # fmt: skip
+        """Sense one tick; arguments as for `SafetyController.step`, and how fast people come [m/s].
 
         Raises:
-            BadInput: Wrong shapes, or values that are no measurement; too many spots out of order; a point, or its
+            BadInput: Wrong shapes, or values that are no measurement; too many sensors out of order; a point, or its
                 danger, that is not finite; both or neither of distances and points: silence is not safety, "nothing in
                 sight" is said by distances of +inf or an empty list of points.
         """
@@ -97,26 +128,36 @@ class Sense:
         q, qd = as_floats("q", q), as_floats("qd", qd)
         if not q.shape == qd.shape == self._shape:
             refuse(q, qd, self._robot)
-        if points is not None:
-            return self._by_points(q, qd, points, ages)
-        if distances is None:
+        more = _NO_MORE
+        if self._ranging is not None:
+            state = self._robot.at(as_joint_position(q, self._robot))
+            as_joint_velocity(qd, self._robot)
+            more = self._ranging.update(() if images is None else images, now, state, self.parts[1], qd, person)
+            if distances is None and points is None and self.parts[0] is None:
+                points = _NOBODY
+        elif images is not None:
+            raise BadInput("images are given but the controller has no range_sensors")
+        if points is None and distances is not None:
+            distances = as_floats("distances", distances)
+            if not (distances.ndim == 2 and distances.shape[1] == 3):
+                return self._by_distances(q, qd, distances, ages, more)
+            points = distances
+        if points is None:
             raise BadInput("neither distances nor points are given; where nothing is in sight, say points=[]")
-        distances = as_floats("distances", distances)
-        if distances.ndim == 2 and distances.shape[1] == 3:
-            return self._by_points(q, qd, distances, ages)
-        return self._by_distances(q, qd, distances, ages)
+        return self._by_points(q, qd, points, ages, more)
 
-    def _by_distances(self, q: Array, qd: Array, distances: Array, ages: ArrayLike | None) -> Seen:
+    def _by_distances(self, q: Array, qd: Array, distances: Array, ages: ArrayLike | None, more: Ranged) -> Seen:
         sensing = self.parts[0]
         if sensing is None:
             raise BadInput("distances are given but the robot has no spots")
         k = len(sensing.fresh)
         if distances.shape != (k,):
             raise BadInput(f"distances have shape {distances.shape}, expected {(k,)}")
-        points, links, danger, vectors = np.empty((k, 3)), np.empty(k, np.int64), np.empty(k), np.empty((k, 3))
+        p = k + len(more.points)
+        points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0 = np.empty(len(q))
         count, dead, out, cdf_n = sense_readings(
-            q, qd, distances, sensing.as_ages(ages), *self.blocks, *sensing.memory, self._before, self._work,
+            q, qd, distances, sensing.as_ages(ages), *more[:3], *self.blocks, *sensing.memory, self._before, self._work,
             points, links, danger, vectors, qd0,
         )  # fmt: skip
         if count < 0:
@@ -127,23 +168,32 @@ class Sense:
         seen = Seen(
             points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, severity != CLEAR
         )
+        seen = self._with(seen, more)
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
 
-    def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None) -> Seen:
+    def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
         if ages is not None:  # old points would count as seen now
             raise BadInput("ages are given with points, which have none: leave out points that are too old")
         given = as_points(value)
-        p = len(given)
+        p = len(given) + len(more.points)
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0, work = np.empty(len(q)), np.empty(work_size(self._sizes, p))
         count, cdf_n = sense_points(
-            q, qd, given, *self.blocks, self._before, work, points, links, danger, vectors, qd0
+            q, qd, given, *more[:3], *self.blocks, self._before, work, points, links, danger, vectors, qd0
         )  # fmt: skip
         if count == -1:
             refuse(q, qd, self._robot)
         if count < 0:
             refuse_points(points)
-        return self._ended(Seen(points, links, danger, vectors, cdf_n, qd0), work, 0)
+        seen = self._with(Seen(points, links, danger, vectors, cdf_n, qd0), more)
+        return self._ended(seen, work, p if len(more.points) else 0)
+
+    def _with(self, seen: Seen, more: Ranged) -> Seen:
+        """The same with what images tell beside their points."""
+        if self._ranging is None:
+            return seen
+        capped = seen.capped or self._ranging.severity != CLEAR
+        return seen._replace(notes=(*seen.notes, *more.notes), capped=capped, near=more.near, leads=more.leads)
 
     @property
     def _before(self) -> Array:
@@ -152,7 +202,7 @@ class Sense:
 
     def _ended(self, seen: Seen, work: Array, moving: int) -> Seen:
         """What is left to do: the stages of another making, and to remember q̇0."""
-        _, field, evasion = self.parts
+        _, field, evasion, _ = self.parts
         if not all(self._ours):
             seen = self._asked(seen, field, evasion, work, moving)
         elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
@@ -182,4 +232,5 @@ class Sense:
         return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)
 
 
+_NO_MORE = Ranged(_NOBODY, _NOWHERE, _NOBODY, _NOBODY, NO_AGES)
 _NOT_FINITE = "the danger of a detected point is not finite: joint values or points are out of all bounds"

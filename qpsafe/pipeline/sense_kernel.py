@@ -130,24 +130,39 @@ def _evade(
     return cdf_n
 
 
+@inline
+def _append(
+    count: int, more: Array, more_links: Index, more_velocities: Array, points: Array, links: Index, velocities: Array
+) -> int:
+    """Put more points behind the first `count`; returns how many there are then."""
+    for p in range(more.shape[0]):
+        links[count + p] = more_links[p]
+        for c in range(3):
+            points[count + p, c], velocities[count + p, c] = more[p, c], more_velocities[p, c]
+    return count + more.shape[0]
+
+
 _any, _block, _ints = readable(1), types.Array(types.float64, 1, "C", readonly=True), types.int64[::1]
 _out, _outs, _ints_block = types.float64[::1], types.float64[:, ::1], types.Array(types.int64, 1, "C", readonly=True)
+_more = (readable(2), types.Array(types.int64, 1, "A", readonly=True), readable(2))
 
 
 @entry(
     types.Tuple((types.int64, types.int64, types.int64, types.float64))(
-        _any, _any, _any, _any, _block, _ints_block,
+        _any, _any, _any, _any, *_more, _block, _ints_block,
         types.int64[:, ::1], _outs, types.boolean[::1], _outs, _ints, _outs,
         _any, _out, _outs, _ints, _out, _outs, _out,
     ),
     kinematics, push, readings, *push.USES, *readings.USES,
 )  # fmt: skip
 def sense_readings(
-    q: Array, qd: Array, distances: Array, ages: Array, f: Array, i: Index,
-    counts: Index, seen: Array, dead: Array, held: Array, age: Index, track: Array,
+    q: Array, qd: Array, distances: Array, ages: Array, more: Array, more_links: Index, more_velocities: Array,
+    f: Array, i: Index, counts: Index, seen: Array, dead: Array, held: Array, age: Index, track: Array,
     before: Array, work: Array, points: Array, links: Index, values: Array, vectors: Array, qd0: Array,
 ) -> tuple[int, int, int, float]:  # fmt: skip
     """Fill points, links, values, vectors and qd0 from the readings of k spots; their memory as for `take_readings`.
+
+    More points (e, 3), with links and velocities, count too.
 
     Returns:
         How many points count, -1 if the measurement is none, and then nothing has been touched; how many spots are
@@ -157,7 +172,7 @@ def sense_readings(
         return -1, 0, 0, nan
     n, m, s, h = i[JOINTS], i[LINKS], i[SPOTS], i[HULLS]
     memory, wire = view(work, 0, (i[MEMORY],)), view(work, i[MEMORY], (4, m, 3))
-    velocities, ticks = view(work, i[MEMORY] + 12 * m + n, (s, 3)), view(i, i[TICKS], (4,))
+    velocities, ticks = view(work, i[MEMORY] + 12 * m + n, (s + more.shape[0], 3)), view(i, i[TICKS], (4,))
     # spot distances -> detected points (7)
     count, dying, out = _take_readings(
         distances, ages, memory, wire[0], wire[1],
@@ -166,6 +181,7 @@ def sense_readings(
         view(f, i[BALLS], (h, 4)), view(f, i[NUMBERS], (i[RAYS] - i[NUMBERS],)), ticks,
         counts, seen, dead, held, age, track, points, links, velocities,
     )  # fmt: skip
+    count = _append(count, more, more_links, more_velocities, points, links, velocities)
     moving = count if ticks[3] else 0  # no velocities: points at rest
     cdf_n = _evade(
         f, i, work, moving, view(points, 0, (count, 3)), view(links, 0, (count,)), view(values, 0, (count,)),
@@ -176,28 +192,35 @@ def sense_readings(
 
 @entry(
     types.Tuple((types.int64, types.float64))(
-        _any, _any, readable(2), _block, _ints_block, _any, _out, _outs, _ints, _out, _outs, _out
+        _any, _any, readable(2), *_more, _block, _ints_block, _any, _out, _outs, _ints, _out, _outs, _out
     ),
     kinematics, push, detection, *push.USES,
 )  # fmt: skip
 def sense_points(
-    q: Array, qd: Array, given: Array, f: Array, i: Index, before: Array, work: Array, points: Array, links: Index,
-    values: Array, vectors: Array, qd0: Array,
+    q: Array, qd: Array, given: Array, more: Array, more_links: Index, more_velocities: Array, f: Array, i: Index,
+    before: Array, work: Array, points: Array, links: Index, values: Array, vectors: Array, qd0: Array,
 ) -> tuple[int, float]:  # fmt: skip
-    """Fill points, links (the nearest), values, vectors and qd0 from given points (p, 3) at rest.
+    """Fill points, links (the nearest), values, vectors and qd0 from given points (p, 3) at rest, and more that move.
 
     Returns:
         How many points there are, -1 if the measurement is none, -2 if a point is not finite; CDF_n, see `_evade`.
     """
     if not _stand(q, qd, f, i, work):
         return -1, nan
-    wire = view(work, i[MEMORY], (4, i[LINKS], 3))
-    for p in range(given.shape[0]):
+    wire, count, total = view(work, i[MEMORY], (4, i[LINKS], 3)), given.shape[0], given.shape[0] + more.shape[0]
+    velocities = view(work, i[MEMORY] + 12 * i[LINKS] + i[JOINTS], (total, 3))
+    for p in range(count):
         for c in range(3):
             points[p, c] = given[p, c]
-    if not _find_nearest(points, wire[0], wire[1], links):
+    if not _find_nearest(view(points, 0, (count, 3)), wire[0], wire[1], view(links, 0, (count,))):
         return -2, nan
-    return given.shape[0], _evade(f, i, work, 0, points, links, values, vectors, before, qd0)
+    moving = 0
+    if total > count:
+        for p in range(count):
+            for c in range(3):
+                velocities[p, c] = 0.0
+        moving = _append(count, more, more_links, more_velocities, points, links, velocities)
+    return total, _evade(f, i, work, moving, points, links, values, vectors, before, qd0)
 
 
 Blocks = tuple[NDArray[np.float64], NDArray[np.int64]]

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from qpsafe.gate.rules import VerifiedMotion
     from qpsafe.laws.problem import Law
     from qpsafe.limits import JointLimits
+    from qpsafe.ranging.ranging import RangeSensing
     from qpsafe.robot.robot import Robot
     from qpsafe.sensing.hulls import Obstacle
     from qpsafe.sensing.sensing import DistanceSensing
@@ -52,17 +53,20 @@ class Stages:
         """A copy makes its own: what is kept here cuts its memory into views, which copying would tear apart."""
         return Stages, (self._robot, self._dt, *self._surroundings)
 
-    def sense(self, sensing: DistanceSensing | None, field: Any, evasion: Evasion) -> Sense:
+    def sense(
+        self, sensing: DistanceSensing | None, field: Any, evasion: Evasion, ranging: RangeSensing | None = None
+    ) -> Sense:
         """From measurements to q̇0.
 
         Args:
             sensing: Distance sensors; None if there are only points.
             field: The danger field.
             evasion: The admittance (16).
+            ranging: Sensors of many zones; None if there are none.
         """
         made = self._sense
         if made is None or not (made.parts[0] is sensing and made.parts[1] is field and made.parts[2] is evasion):
-            made = self._sense = Sense(self._robot, sensing, field, evasion)
+            made = self._sense = Sense(self._robot, sensing, field, evasion, ranging)
         return made
 
     def resolve(self, tasks: Sequence[Task], law: Law) -> Resolve:
@@ -96,14 +100,14 @@ class Stages:
             measured: Joint position (n,) [rad].
             seen: Detected points and their danger.
             resolve: The half of the tick.
-            given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits and soft levels, as
+            given: Commanded state, velocity, the one before, samples, q̇0, activations, limits and soft levels, as
                 `resolve` takes them.
         """
         state = self._robot.at(measured)
-        commanded, qd, qdd, samples, qd0, active, limits, soft = given
+        commanded, qd, before, samples, qd0, active, limits, soft = given
         level = barrier.level(state, qd, seen.points, seen.danger)
         soft = (*soft, level) if level else soft
-        resolved = resolve(commanded, qd, qdd, samples, qd0, active, limits, soft)
+        resolved = resolve(commanded, qd, before, samples, qd0, active, limits, soft)
         # exact, as far as the acceleration limits allow
         command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
         resolved.command = command if resolved.box is None else resolved.box.clip(command)

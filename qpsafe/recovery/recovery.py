@@ -145,7 +145,7 @@ class Recovery:
         if self._way is not None and way is not None:
             self._way.clocks = way
 
-    def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
+    def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> Sequence[Any]:
         """Advance one tick and give each task its reference.
 
         Args:

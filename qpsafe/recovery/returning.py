@@ -32,6 +32,29 @@ _FLOAT = np.dtype(np.float64)
 _NONE = np.empty(0)
 
 
+class Led(Sequence[Any]):
+    """References of tasks that are led back, one sample a task.
+
+    Args:
+        goals, twists: Of all tasks (N, 4, 4), (N, 6).
+        asked: Samples in place of these, of tasks that were asked for theirs, by number.
+    """
+
+    __slots__ = ("asked", "goals", "twists")
+
+    def __init__(self, goals: Array, twists: Array, asked: dict[int, Any]) -> None:
+        self.goals, self.twists, self.asked = goals, twists, asked
+
+    def __len__(self) -> int:
+        return len(self.goals)
+
+    def __getitem__(self, k: Any) -> Any:
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        k = range(len(self))[k]
+        return self.asked[k] if k in self.asked else Sample(self.goals[k], self.twists[k])
+
+
 class Returns:
     """Returns of the tasks of a path.
 
@@ -56,6 +79,8 @@ class Returns:
         self._sizes = [6] * count
         self._marks = np.zeros((count, 3), dtype=np.int64)
         self._returns, self._before = np.zeros((count, 14)), np.zeros((count, 6))
+        self._drift, self._poses = np.empty((count, 2, 6)), np.empty((count, 4, 4))
+        self._begun = False  # and nothing has changed since
         self._robot: Any = None
         self._frames: tuple[NDArray[np.int64], Array] = np.zeros(count, dtype=np.int64), np.zeros((count, 4, 4))
 
@@ -70,8 +95,9 @@ class Returns:
         Args:
             anew: Whether it is not known where they were.
         """
-        self.pending = [True] * len(self._tasks)
-        self._marks[:, PENDING], self._marks[:, RETURNING] = 1, 0
+        if not self._begun:
+            self.pending, self._begun = [True] * len(self._tasks), True
+            self._marks[:, PENDING], self._marks[:, RETURNING] = 1, 0
         if anew:
             self._marks[:, KNOWN] = 0
 
@@ -82,7 +108,7 @@ class Returns:
 
     @clocks.setter
     def clocks(self, clocks: tuple[tuple[bool, ...], bytes, bytes] | None) -> None:
-        count = len(self._tasks)
+        count, self._begun = len(self._tasks), False
         if clocks is None:
             self.pending = [False] * count
             self._marks[:, (PENDING, RETURNING)] = 0
@@ -105,7 +131,7 @@ class Returns:
 
     def references(
         self, samples: Sequence[Any], share: float, state: RobotState, activations: tuple[float, ...]
-    ) -> tuple[Any, ...]:
+    ) -> Led:
         """The samples on a clock that runs `share` times as fast, displaced where a task has to come back.
 
         Args:
@@ -118,7 +144,7 @@ class Returns:
             ValueError: A reference is not finite; nothing has changed.
         """
         count = len(samples)
-        goals, twists, poses = np.empty((count, 4, 4)), np.empty((count, 6)), np.empty((count, 4, 4))
+        goals, twists = np.empty((count, 4, 4)), np.empty((count, 6))
         asked: dict[int, tuple[Any, Array, int]] = {}
         plain, active = type(state) is RobotState, 0
         for k, (sample, ours) in enumerate(zip(samples, self._ours, strict=True)):
@@ -138,24 +164,25 @@ class Returns:
             goals[k], twists[k] = 0.0, 0.0
         if plain and state.robot is not self._robot:
             self._mount(state.robot)
-        kinds, drift = self._kinds, np.empty((count, 2, self._before.shape[1]))
+        kinds, drift = self._kinds, self._drift
         if asked:
-            kinds = kinds.copy()
+            kinds, drift = kinds.copy(), np.empty((count, 2, self._before.shape[1]))
             for k, (_, offset, kind) in asked.items():
                 drift[k, 0, : len(offset)], kinds[k] = offset, kind
+        self._begun = self._begun and not active  # what is released is only held
         done = lead_references(
             state.memory if plain else _NONE, *self._frames, kinds, self._numbers, active, share, self._marks,
-            self._returns, self._before, goals, twists, drift, poses,
+            self._returns, self._before, goals, twists, drift, self._poses,
         )  # fmt: skip
         if done < 0:
             raise ValueError(f"the trajectory of the {self._tasks[-1 - done].name} task is not finite")
         if done:
             self.pending = [waits and not done >> k & 1 for k, waits in enumerate(self.pending)]
-        led: list[Any] = [Sample(goal, twist) for goal, twist in zip(goals, twists, strict=True)]
+        told: dict[int, Any] = {}
         for k, (sample, offset, _) in asked.items():
             size = len(offset)
-            led[k] = sample.displaced(drift[k, 0, :size], drift[k, 1, :size]) if self.pending[k] else sample
-        return tuple(led)
+            told[k] = sample.displaced(drift[k, 0, :size], drift[k, 1, :size]) if self.pending[k] else sample
+        return Led(goals, twists, told)
 
     def _ask(self, k: int, sample: Any, state: RobotState) -> tuple[Any, Array, int]:
         """A sample; the offset from it of a task that is pending, else none; what that is made of."""
@@ -181,6 +208,7 @@ class Returns:
             before = np.zeros((count, size))
             before[:, :width] = self._before
             self._before, self._returns = before, _widened(self._returns, size)
+            self._drift = np.empty((count, 2, size))
 
     def _mount(self, robot: Any) -> None:
         """Take the places of the tasks' frames on a robot."""

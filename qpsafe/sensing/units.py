@@ -92,6 +92,8 @@ class UnitWatch:
         self._tick += 1
         if self._tick % self.every == 0:
             given = distances if points is None else points
+            if given is None:  # images only
+                return self._notes
             array = np.asarray(given, dtype=float)
             if array.ndim == 1 and points is None:
                 self._look_at_readings(array)

@@ -103,6 +103,8 @@ def test_ticks_are_equal_only_where_all_they_say_is(irb140: Any) -> None:
             value = getattr(tick, part.name)
             if part.name == "reference":
                 changed = replace(value, seq=value.seq + 1)
+            elif isinstance(value, np.ndarray) and not value.size:
+                changed = np.ones((1, *value.shape[1:]))
             elif isinstance(value, np.ndarray | float):
                 changed = value + 1
             elif isinstance(value, str):

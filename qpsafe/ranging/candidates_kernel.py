@@ -1,0 +1,177 @@
+"""What is known between two images, compiled: points are kept, moved, forgotten, and chosen from.
+
+A point of a sensor's last image counts where it was seen, or where its velocity has taken it if that is nearer. A
+point that the next image does not show is lost: it still counts for a while, and meanwhile comes nearer at the walking
+speed of ISO 13855, as with spots.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from numba import types
+
+from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
+from qpsafe.ranging import reduce_kernel
+from qpsafe.ranging.reduce_kernel import to_link
+from qpsafe.robot.kinematics import Index
+
+#: Columns of a kept point: place, velocity, how wrong the place may be, when it was seen, when it was lost (inf: not).
+PLACE, VELOCITY, WRONG, STAMP, LOST = 0, 3, 6, 7, 8
+WIDTH = 9
+#: Numbers of `place_all`.
+NOW, HOLD, APPROACH, NEAREST, PERSON, AHEAD = range(6)
+
+_any, _two = readable(1), readable(2)
+_out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1]
+
+
+@entry(types.int64(_outs, types.int64, _outs, types.int64, _two, types.float64, types.float64, types.float64))
+def renew(
+    store: Array, count: int, kept: Array, new: int, velocities: Array, stamp: float, hold: float, again: float
+) -> int:
+    """Put an image's points before those of earlier ones; returns how many there are now.
+
+    Args:
+        store: Of one sensor (r, WIDTH).
+        count: How many points it holds.
+        kept: The image's (at least `new` rows, 4), see `reduce_zones`.
+        new: How many.
+        velocities: Theirs (new, 3) [m/s].
+        stamp: Of the image [s].
+        hold: How long lost points still count [s].
+        again: An earlier point this near to a new one is the same thing [m].
+    """
+    left = 0
+    for i in range(count):  # those that are lost, to the front
+        p, lost = (store[i, 0], store[i, 1], store[i, 2]), min(store[i, LOST], stamp)
+        gone = stamp - lost > hold
+        for j in range(new):
+            w = add((kept[j, 0], kept[j, 1], kept[j, 2]), -1.0, p)
+            gone = gone or dot(w, w) <= again * again
+        if not gone:
+            for c in range(WIDTH):
+                store[left, c] = store[i, c]
+            store[left, LOST] = lost
+            left += 1
+    left = min(left, store.shape[0] - new)
+    for i in range(left - 1, -1, -1):
+        for c in range(WIDTH):
+            store[new + i, c] = store[i, c]
+    for j in range(new):
+        for c in range(3):
+            store[j, c], store[j, VELOCITY + c] = kept[j, c], velocities[j, c]
+        store[j, WRONG], store[j, STAMP], store[j, LOST] = kept[j, 3], stamp, inf
+    return new + left
+
+
+@entry(
+    types.int64(
+        types.float64[:, :, ::1], _whole, _whole, _any, _any, _two, _two, _outs, _whole, _outs, _whole, _outs, _out
+    ),
+    reduce_kernel,
+)
+def place_all(
+    store: Array, counts: Index, carriers: Index, patience: Array, numbers: Array, starts: Array, ends: Array,
+    points: Array, links: Index, velocities: Array, sensors: Index, seen: Array, leads: Array,
+) -> int:  # fmt: skip
+    """Where all kept points count now; those that are too old are forgotten.
+
+    Args:
+        store: Of all sensors (s, r, WIDTH).
+        counts: How many points each holds (s,).
+        carriers: The link that a sensor's points act on (s,); -1: the nearest.
+        patience: How old a point of the last image may be before it counts as lost (s,) [s].
+        numbers: Present time, hold time [s], speed of lost points [m/s], how near to the wire they come [m], how fast
+            people come [m/s], how far the gate looks ahead [s].
+        starts, ends: Of the robot's wire (links, 3).
+        points, links, velocities, sensors: Filled: where a point counts (s r, 3), its link, the part of its velocity
+            towards that link (s r, 3), its sensor (s r,).
+        seen, leads: Filled: where it was seen (s r, 3), and for how long before now somebody as fast as `PERSON`
+            would have had to come from there to be as far as this one may be (s r,) [s].
+
+    Returns:
+        How many points count.
+    """  # fmt: skip
+    now, total = numbers[NOW], 0
+    for s in range(store.shape[0]):
+        left = 0
+        for i in range(counts[s]):
+            lost = min(store[s, i, LOST], store[s, i, STAMP] + patience[s])
+            if now - lost > numbers[HOLD]:
+                continue
+            for c in range(WIDTH):
+                store[s, left, c] = store[s, i, c]
+            v = (store[s, left, 3], store[s, left, 4], store[s, left, 5])
+            p, age, fast = (store[s, left, 0], store[s, left, 1], store[s, left, 2]), now - store[s, left, STAMP], 0.0
+            link, least = 0, inf
+            moved = add(p, max(age, 0.0), v)
+            for k in range(starts.shape[0]):
+                # links share their ends, so that several may be as near: the first one counts, whatever rounding says
+                here = to_link(p, starts, ends, k)
+                there = to_link(moved, starts, ends, k)
+                if min(here, there) < (1.0 - 1e-9) * least:
+                    link, least = k, min(here, there)
+            if carriers[s] >= 0:
+                link = carriers[s]
+            if to_link(moved, starts, ends, link) < to_link(p, starts, ends, link):
+                p = moved
+            # towards the link
+            d, w = add(row(ends, link), -1.0, row(starts, link)), add(p, -1.0, row(starts, link))
+            l = min(max(dot(w, d) / max(dot(d, d), 1e-300), 0.0), 1.0)
+            way = add(add(row(starts, link), l, d), -1.0, p)
+            length = sqrt(dot(way, way))
+            step = min(numbers[APPROACH] * max(now - lost, 0.0), length - numbers[NEAREST])
+            if step > 0.0:
+                p = add(p, step / length, way)
+            towards = dot(v, way) / length if length > 0.0 else 0.0
+            for c in range(3):
+                points[total, c], seen[total, c] = p[c], store[s, left, c]
+                velocities[total, c] = towards / length * way[c] if towards > 0.0 else 0.0
+            fast = max(sqrt(dot(v, v)) - numbers[PERSON], 0.0) * (max(age, 0.0) + numbers[AHEAD])
+            leads[total] = max(age, 0.0) + (store[s, left, WRONG] + fast) / max(numbers[PERSON], 1e-9)
+            links[total], sensors[total] = link, s
+            left, total = left + 1, total + 1
+        counts[s] = left
+    return total
+
+
+@entry(types.int64(_two, _whole, _whole, _any, types.int64, types.float64, _whole, _whole))
+def choose(
+    points: Array, links: Index, sensors: Index, danger: Array, most: int, apart: float, marks: Index, chosen: Index
+) -> int:
+    """Choose the points that count in eq. (8): of each link and sensor the most dangerous ones, and nothing twice.
+
+    Args:
+        points, links, sensors, danger: Of p points, see `place_all`.
+        most: How many of each link and sensor.
+        apart: Of points of one link that are as near to each other as that only the most dangerous one counts,
+            whoever saw them [m].
+        marks: To work in (p,).
+        chosen: Filled with their numbers, in falling order of danger (p,).
+
+    Returns:
+        How many were chosen.
+    """  # fmt: skip
+    count = points.shape[0]
+    for i in range(count):
+        marks[i] = 0
+    total = 0
+    while True:
+        best = -1
+        for i in range(count):
+            if marks[i] == 0 and (best < 0 or danger[i] > danger[best]):
+                best = i
+        if best < 0:
+            return total
+        marks[best], chosen[total] = 2, best
+        total += 1
+        taken = 0
+        for i in range(total):
+            taken += links[chosen[i]] == links[best] and sensors[chosen[i]] == sensors[best]
+        b = row(points, best)
+        for i in range(count):
+            if marks[i] == 0 and links[i] == links[best]:
+                w = add(row(points, i), -1.0, b)
+                if dot(w, w) <= apart * apart or (taken >= most and sensors[i] == sensors[best]):
+                    marks[i] = 1

@@ -1,0 +1,128 @@
+"""From an image to the few points of it that matter: tables of one sensor, tiles of dense images, the compiled call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.ranging.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile
+
+if TYPE_CHECKING:
+    from qpsafe.ranging.judge import Usable
+    from qpsafe.ranging.rules import RangeRules
+    from qpsafe.ranging.sensor import RangeSensor
+    from qpsafe.robot.wire import Wire
+    from qpsafe.sensing.hulls import HullSet
+    from qpsafe.sensing.rules import SensingRules
+
+Array = NDArray[np.float64]
+
+
+class Shown(NamedTuple):
+    """What an image shows, in numbers of zones.
+
+    Attributes:
+        valid: That tell anything.
+        hits: That see something within the sensor's range.
+        own: That see the robot itself.
+        known: That see known obstacles.
+        expected: Of those that were asked, that known things fill.
+        through: Of these, that see through what is there.
+        impossible: That read less than nothing.
+        seen: Whose points count.
+    """
+
+    valid: int
+    hits: int
+    own: int
+    known: int
+    expected: int
+    through: int
+    impossible: int
+    seen: int
+
+
+def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
+    """A sensor whose zones are tiles of another one's, and pixels along the edge of a tile.
+
+    Args:
+        sensor: Of many zones in rows and columns.
+        most: How many zones it may have.
+    """
+    rows, columns = sensor.shape
+    size = 1
+    while -(-rows // size) * -(-columns // size) > most:
+        size += 1
+    if size == 1:
+        return sensor, 1
+    grid = sensor.directions.reshape(rows, columns, 3)
+    pitch = sensor.half_angle.reshape(rows, columns)
+    directions, angles = [], []
+    for top in range(0, rows, size):
+        for left in range(0, columns, size):
+            part = grid[top : top + size, left : left + size].reshape(-1, 3)
+            middle = part.mean(axis=0)
+            middle /= np.linalg.norm(middle)
+            directions.append(middle)
+            cone = pitch[top : top + size, left : left + size].ravel()
+            angles.append(float((np.arccos(np.clip(part @ middle, -1.0, 1.0)) + cone).max()))
+    shape = (-(-rows // size), -(-columns // size))
+    return replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=shape), size
+
+
+class Reducer:
+    """Reduces the images of one sensor.
+
+    Args:
+        sensor: The sensor.
+        rules: Numbers for images.
+        sensing: Tolerances.
+        hulls: The robot itself and known obstacles.
+        links: How many links the robot's wire has.
+
+    Attributes:
+        zones: The sensor, or its tiles.
+        size: Pixels along the edge of a tile.
+        kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
+    """
+
+    def __init__(
+        self, sensor: RangeSensor, rules: RangeRules, sensing: SensingRules, hulls: HullSet, links: int
+    ) -> None:
+        self.zones, self.size = tiled(sensor, rules.dense)
+        count = len(self.zones)
+        self._slants = np.tan(self.zones.half_angle)
+        self._numbers = np.array([
+            sensor.range_min, sensor.range_max, sensing.tolerance, rules.spread, rules.reach, rules.deviations,
+        ])  # fmt: skip
+        self._tables, self._each, self._support = hulls.tables, rules.each, rules.support
+        self._stride = farthest_zone(count)
+        self._work = np.empty((count, 4)), np.empty((links, count)), np.empty(count, dtype=np.int64)
+        self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
+        self.kept = np.empty((links * rules.each, 4))
+        self._shown = np.zeros(SHOWN, dtype=np.int64)
+
+    def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire) -> tuple[int, Shown]:
+        """Reduce an image: how many points `kept` holds now, and what the image shows.
+
+        Args:
+            image: Whose arrays fit.
+            pose: Of the sensor when it was taken (4, 4).
+            then: Poses of the robot's bodies when it was taken (b, 4, 4).
+            wire: The robot's, now.
+        """
+        distances, valid, sigma = image.distances, image.valid, image.sigma
+        if self.size > 1:
+            shape, nearest, known = image.shape, *self._tiles
+            tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
+            sigma = np.full(len(nearest), float(sigma.max(initial=0.0)) if sigma.size > 1 else float(sigma[0]))
+            distances, valid = nearest, known
+        count = reduce_zones(
+            distances, sigma, valid, self.zones.directions, self._slants, pose, self._numbers,
+            wire.starts, wire.ends, then, *self._tables, *self._work, self._each, self._stride, self.kept,
+            self._shown,
+        )  # fmt: skip
+        return count, Shown(*self._shown.tolist())
