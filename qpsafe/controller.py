@@ -261,7 +261,7 @@ class SafetyController(Running):
             task_names=self._labels,
             gate=gated,
             resolved=resolved,
-            off_path=None if recovery.on_path else recovery.errors(commanded),
+            off_path=None if recovery.on_path else recovery.errors(commanded, samples),
         )
 
     def _brake(self, status: str, message: str) -> Tick:

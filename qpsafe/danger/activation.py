@@ -139,6 +139,8 @@ class Activation(Fixed):
         self._plain = all(type(threshold) is Threshold for threshold in self.levels)
         self._numbers = [(level.start, level.end, level.delta, level.epsilon) for level in self.levels]
         self._calm = Switching((1.0,) * n, (1.0,) * len(self.thresholds), self._names[-1])
+        self._released = Switching((0.0,) * n, (0.0,) * len(self.thresholds), self._names[0])
+        self._least, self._most = self.levels[-1].start, self.levels[0].end if self._plain else math.inf
         for k in range(len(self.thresholds) - 1):
             upper, lower = self.thresholds[k], self.thresholds[k + 1]
             if lower != upper and lower.end > upper.start:
@@ -178,8 +180,10 @@ class Activation(Fixed):
                 expected = f"1 >= a_1 >= ... >= 0 for {counted(len(self.thresholds), 'task')}"
                 raise ValueError(f"the activations are {found}, expected {expected}")
             return Switching(self.switches(cdf_n), found, self.regime(cdf_n))
-        if cdf_n <= self.levels[-1].start:  # below the lowest threshold
+        if cdf_n <= self._least:  # below the lowest threshold
             return self._calm
+        if cdf_n >= self._most:  # beyond the highest one
+            return self._released
         if self._plain:
             switches = [switch(cdf_n, *numbers) for numbers in self._numbers]
         else:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from qpsafe.recovery import steps
 from qpsafe.recovery.events import Cursor
 from qpsafe.recovery.return_kernel import KEPT
-from qpsafe.recovery.returning import Returns, return_numbers
+from qpsafe.recovery.returning import Led, Returns, return_numbers
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.recovery.steps import FINITE, MET, PHASES, quiet_after
-from qpsafe.tasks.errors import TaskErrors
+from qpsafe.tasks.errors import TaskErrors, answers_alike
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.trajectory import FixedJoints
 
@@ -106,6 +106,7 @@ class Recovery:
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks, self.suspend_above, self._way = tuple(tasks), suspend_above, None
         self._returns = Returns(self.tasks, self._rules, self._dt)
+        self._alike = all(map(answers_alike, self.tasks))
         if self.phase != FOLLOWING:
             self._returns.begin()
         self._last: tuple[Any, Any] | None = None  # state and references of suspended tasks, last tick
@@ -200,9 +201,16 @@ class Recovery:
         """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
         return self._returns.over
 
-    def errors(self, state: RobotState) -> TaskErrors:
-        """Of the tasks against their own trajectories at this tick, at a commanded configuration."""
-        return TaskErrors(self.tasks, state, self._sampled() if self._samples is None else self._samples)
+    def errors(self, state: RobotState, references: Sequence[Any]) -> TaskErrors:
+        """Of the tasks against their own trajectories.
+
+        Args:
+            state: Commanded configuration of this tick.
+            references: What `update` returned.
+        """
+        if type(references) is Led and not references.asked and self._alike:
+            return TaskErrors(self.tasks, state, references.wanted, {})
+        return TaskErrors.against(self._sampled() if self._samples is None else self._samples, self.tasks, state)
 
     def due_events(self) -> tuple[str, ...]:
         """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""

@@ -37,13 +37,14 @@ class Led(Sequence[Any]):
 
     Args:
         goals, twists: Of all tasks (N, 4, 4), (N, 6).
+        wanted: Where the tasks' own trajectories are (N, 4, 4).
         asked: Samples in place of these, of tasks that were asked for theirs, by number.
     """
 
-    __slots__ = ("asked", "goals", "twists")
+    __slots__ = ("asked", "goals", "twists", "wanted")
 
-    def __init__(self, goals: Array, twists: Array, asked: dict[int, Any]) -> None:
-        self.goals, self.twists, self.asked = goals, twists, asked
+    def __init__(self, goals: Array, twists: Array, wanted: Array, asked: dict[int, Any]) -> None:
+        self.goals, self.twists, self.wanted, self.asked = goals, twists, wanted, asked
 
     def __len__(self) -> int:
         return len(self.goals)
@@ -169,6 +170,7 @@ class Returns:
             kinds, drift = kinds.copy(), np.empty((count, 2, self._before.shape[1]))
             for k, (_, offset, kind) in asked.items():
                 drift[k, 0, : len(offset)], kinds[k] = offset, kind
+        wanted = goals.copy()
         self._begun = self._begun and not active  # what is released is only held
         done = lead_references(
             state.memory if plain else _NONE, *self._frames, kinds, self._numbers, active, share, self._marks,
@@ -182,7 +184,7 @@ class Returns:
         for k, (sample, offset, _) in asked.items():
             size = len(offset)
             told[k] = sample.displaced(drift[k, 0, :size], drift[k, 1, :size]) if self.pending[k] else sample
-        return Led(goals, twists, told)
+        return Led(goals, twists, wanted, told)
 
     def _ask(self, k: int, sample: Any, state: RobotState) -> tuple[Any, Array, int]:
         """A sample; the offset from it of a task that is pending, else none; what that is made of."""
