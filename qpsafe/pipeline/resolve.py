@@ -133,6 +133,7 @@ class Resolve:
             for task, rows in zip(tasks, self._rows, strict=True)
         ]
         self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
+        self._weighed: tuple[Any, list[float]] = (), []  # the last activations, and what they weigh
         self._layouts: dict[tuple[int, ...], tuple[Any, ...]] = {}
 
     def __call__(
@@ -183,7 +184,10 @@ class Resolve:
                 cut.bounds[0], cut.bounds[1] = box.lower, box.upper
                 cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        self._qd0[:], weights = qd0, weigh(activations, self._weights).tolist()
+        self._qd0[:] = qd0
+        if activations is not self._weighed[0] or type(activations) is not tuple:
+            self._weighed = activations, weigh(activations, self._weights).tolist()
+        weights = self._weighed[1]
         damping = self._numbers[:2] if ours and self._kind == STRICT else (np.nan, np.nan)
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
@@ -241,11 +245,17 @@ class Resolve:
         n, ends = self._robot.nq, [0, *accumulate(counts)]
         b, e = ends[-1] * n, ends[-1] * (n + 1)
         for k, clik in asked.items():
-            first, stop, count = ends[k], ends[k + 1], (counts[k],)
-            jacobian = reals(f"the Jacobian of task {k + 1}", clik.jacobian, (counts[k], n))
-            floats[first * n : stop * n].reshape(-1, n)[:] = jacobian
-            floats[b + first : b + stop] = reals(f"the velocity of task {k + 1}", clik.velocity, count)
-            floats[e + first : e + stop] = reals(f"the error of task {k + 1}", clik.error, count)
+            first, stop = ends[k], ends[k + 1]
+            self._put(floats[first * n : stop * n].reshape(-1, n), clik.jacobian, "Jacobian", k)
+            self._put(floats[b + first : b + stop], clik.velocity, "velocity", k)
+            self._put(floats[e + first : e + stop], clik.error, "error", k)
+
+    @staticmethod
+    def _put(place: Array, value: Any, what: str, k: int) -> None:
+        """Write down what task k answered, if it is an array of real numbers of this shape."""
+        if not (type(value) is np.ndarray and value.dtype == _FLOAT and value.shape == place.shape):
+            value = reals(f"the {what} of task {k + 1}", value, place.shape)
+        place[...] = value
 
     def _by_law(
         self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]
