@@ -205,7 +205,7 @@ class DistanceSensing(Fixed):
     @property
     def unseen(self) -> tuple[str, ...]:
         """Names of the spots whose sector nobody sees: unusable in the last tick, or dead."""
-        return tuple([self.spots.names[i] for i in self.health.out_of_order])
+        return tuple([self.spots.names[i] for i in self.health.out_of_order]) if self.health.any_out else ()
 
     @property
     def counted(self) -> Array:
