@@ -1,0 +1,58 @@
+"""Ways back: those of tasks of another making, asked one by one, are those that one compiled call leads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import qpsafe
+from qpsafe.recovery.recovery import Recovery
+from qpsafe.tasks.errors import TaskErrors
+from qpsafe.tasks.moves import Line
+
+DT = 0.004
+
+
+class Asked(qpsafe.FrameTask):
+    """The same task; but that its offset is the same is not known to compiled code."""
+
+    def offset(self, value: np.ndarray, sample: Any) -> np.ndarray:
+        return super().offset(value, sample)
+
+
+def ways(robot: Any, kinds: tuple[Any, ...], rules: qpsafe.RecoveryRules) -> list[Any]:
+    """References and clocks of tasks of these kinds on the way of a robot that is pushed away and left alone."""
+    start = robot.pose("tcp", robot.home)
+    goal = start.copy()
+    goal[:3, 3] += 0.1, 0.05, -0.1
+    path = Line(start, goal)
+    tasks = [kind("tcp", path, rows=rows) for kind, rows in zip(kinds, ((0, 1, 2), (3, 4, 5)), strict=True)]
+    recovery, rng, told, q = Recovery(tasks, 9.775, DT, rules), np.random.default_rng(3), [], robot.home
+    for k in range(400):
+        danger = 20.0 if 20 <= k < 40 or 180 <= k < 183 else 1.0
+        q = q + (rng.normal(0.0, 1e-3, robot.nq) if k < 40 else 0.0)
+        state, activations = robot.at(q), (1.0, 0.0 if 125 <= k < 150 else 1.0) if danger < 9.0 else (0.0, 0.0)
+        clocks = recovery.clocks
+        samples = recovery.update(danger, state, activations)
+        if k % 30 == 0 and recovery.phase != "following":  # a tick that failed, and its clocks set back, leave no trace
+            recovery.clocks = clocks
+            samples = recovery.update(danger, state, activations)
+        if k % 9 == 0:
+            errors = recovery.errors(state, samples).values
+            against = TaskErrors.against([path.sample(recovery.path_time)] * 2, tasks, state).values
+            assert all(np.array_equal(a, b) for a, b in zip(errors, against, strict=True))
+        told.append((recovery.phase, recovery.path_time, *[part for sample in samples for part in sample]))
+    assert {one[0] for one in told} == {"following", "suspended", "recovering"}
+    return told
+
+
+@pytest.mark.parametrize("rules", [qpsafe.RecoveryRules(), qpsafe.RecoveryRules.paper()], ids=["ours", "paper"])
+def test_a_task_that_is_asked_is_led_back_as_one_that_is_not(irb140: Any, rules: Any) -> None:
+    ours = ways(irb140, (qpsafe.FrameTask, qpsafe.FrameTask), rules)
+    for kinds in ((Asked, qpsafe.FrameTask), (Asked, Asked)):
+        for one, other in zip(ours, ways(irb140, kinds, rules), strict=True):
+            assert one[:2] == other[:2]
+            for a, b in zip(one[2:], other[2:], strict=True):
+                np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
