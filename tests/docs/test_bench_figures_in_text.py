@@ -140,6 +140,10 @@ def arrays(spots: dict[str, Any]) -> list[str]:
         values = found["curves"][objective][what][1]
         return 1 + max(k for k, value in enumerate(values) if value < at_least)
 
+    met = measured("place-encounters")
+    near = {name: [f"{100 * share:.0f}" for share in met[name]["all"]] for name in ("spots", "vl53l5cx")}
+    hand = {name: f"{100 * met[name]['hand'][1]:.0f}" for name in near}
+    assert met["within"] == [0.1, 0.3]
     waist = sum(name.startswith("waist") for name in found["placements"]["nearest"]["spots"])
     return [
         f"To detect 95 % takes {first('detection', 'probability', 0.95)} arrays, "
@@ -149,6 +153,11 @@ def arrays(spots: dict[str, Any]) -> list[str]:
         f"To see the nearest part of 95 % takes {first('nearest', 'nearest', 0.95)} arrays, "
         f"of 99 % takes {first('nearest', 'nearest', 0.99)}",
         f"are on the waist ({waist})",
+        f"In {met['trials']} encounters",
+        f"at {met['instants']} instants with somebody nearer than 0.5 m",
+        f"by the 20 Sharps in {near['spots'][1]} %, by the 20 arrays in {near['vl53l5cx'][1]} %; "
+        f"within 0.1 m in {near['spots'][0]} and {near['vl53l5cx'][0]} %",
+        f"In {met['hands']} of them that part was a hand: {hand['spots']} and {hand['vl53l5cx']} % within 0.3 m",
     ]
 
 
