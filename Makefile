@@ -48,8 +48,10 @@ docs: $(VENV)/.docs ## the site, in build/docs/html; a warning is an error
 	$(BIN)/python docs/site_pages/links.py build/docs/html
 	@echo "docs: build/docs/html/index.html"
 
+# with the back end of OpenGL that works here, unless MUJOCO_GL names one
 figures: $(VENV)/.dev ## all figures of the docs again, from the code
-	for script in docs/figures*.py; do $(BIN)/python $$script || exit 1; done
+	export MUJOCO_GL=$${MUJOCO_GL:-$$($(BIN)/python -m qpsafe.sim.drawing.gl)}; \
+	for script in docs/figures*.py robots/*/picture.py; do $(BIN)/python $$script || exit 1; done
 
 bench: $(VENV)/.bench ## the tick, its parts and its peers; the hierarchical solvers against exact arithmetic
 	$(BIN)/qpsafe bench --out bench.json

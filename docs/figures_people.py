@@ -66,7 +66,7 @@ def campaign_people() -> None:
         places = np.stack(story.people[0].course(times)[:2], axis=1)
         nearest = int(np.argmin(np.hypot(*places.T)))
         view = mujoco.MjvCamera()
-        view.lookat[:], view.distance, view.elevation = (0.35, 0.0, 0.2), 4.4, -16.0
+        view.lookat[:], view.distance, view.elevation = (0.35, 0.0, 0.2), 5.0, -16.0
         view.azimuth = np.degrees(np.arctan2(places[nearest, 1], places[nearest, 0])) + 180.0 + 65.0
         renderer, frames = mujoco.Renderer(scene.model, 300, 300), []
         later = (-0.6, -0.3, 0.0, 0.3, 0.7, 1.3) if kind != "reach" else (-0.6, 0.0, 0.7, 1.2, 1.8, 2.5)

@@ -40,6 +40,9 @@ _PUBLIC = {
     "PostureTask": "qpsafe.tasks.joint",
     "Program": "qpsafe.tasks.program",
     "QpsafeError": "qpsafe.errors",
+    "RangeImage": "qpsafe.ranging.sensor",
+    "RangeRules": "qpsafe.ranging.rules",
+    "RangeSensor": "qpsafe.ranging.sensor",
     "RecoveryRules": "qpsafe.recovery.returns",
     "RelativeFrameTask": "qpsafe.tasks.frame",
     "Robot": "qpsafe.robot.robot",
@@ -103,6 +106,9 @@ if TYPE_CHECKING:
     from qpsafe.limits import Box as Box
     from qpsafe.limits import JointLimits as JointLimits
     from qpsafe.ranging.cell_cameras import load_cameras as load_cameras
+    from qpsafe.ranging.rules import RangeRules as RangeRules
+    from qpsafe.ranging.sensor import RangeImage as RangeImage
+    from qpsafe.ranging.sensor import RangeSensor as RangeSensor
     from qpsafe.ranging.sensor_file import load_range_sensors as load_range_sensors
     from qpsafe.recovery.returns import RecoveryRules as RecoveryRules
     from qpsafe.reference import JointReference as JointReference

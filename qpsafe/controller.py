@@ -44,7 +44,7 @@ from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.speed_cap import slowed
 from qpsafe.sensing.spots import SpotArray
-from qpsafe.tasks.task import Task, errors_of
+from qpsafe.tasks.task import Task
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 _WAY_LAW = HierarchicalLaw()
+_SILENT: tuple[str, ...] = ()
 
 
 class SafetyController(Running):
@@ -221,7 +222,7 @@ class SafetyController(Running):
         if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law)
-        given = (commanded, self._qd, self._acceleration, samples, qd0, active, limits, soft)
+        given = (commanded, self._qd, self._qd_before, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)
         else:
@@ -233,7 +234,7 @@ class SafetyController(Running):
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
-        gated, gate, doubts = PASSED, self.verifies, tuple[str, ...]()
+        gated, gate, doubts = PASSED, self.verifies, _SILENT
         if gate is not None:
             command, doubts = command.copy(), gate.notes()
             gated = gate(self._q, self._qd, command, seen.people, old, seen.leads)
@@ -260,7 +261,7 @@ class SafetyController(Running):
             task_names=self._labels,
             gate=gated,
             resolved=resolved,
-            off_path=None if recovery.on_path else errors_of(self._tasks, commanded, recovery.path_time),
+            off_path=None if recovery.on_path else recovery.errors(commanded, samples),
         )
 
     def _brake(self, status: str, message: str) -> Tick:

@@ -14,6 +14,7 @@ from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
 from qpsafe.pipeline.resolve import Resolved
 from qpsafe.reference import JointReference, same
+from qpsafe.tasks.errors import TaskErrors
 from qpsafe.text.words import counted
 
 #: The tick went as planned.
@@ -90,13 +91,13 @@ class Tick:
     task_names: tuple[str, ...] = ()
     gate: Gated = PASSED
     resolved: Resolved | None = None
-    off_path: tuple[NDArray[np.float64], ...] | None = None
+    off_path: TaskErrors | None = None
 
     @property
     def errors(self) -> tuple[NDArray[np.float64], ...]:
         """Task errors of the commanded pose against the tasks' own trajectories, per task (rows,)."""
         if self.off_path is not None:
-            return self.off_path
+            return self.off_path.values
         return () if self.resolved is None else self.resolved.errors
 
     @property
@@ -168,7 +169,7 @@ class Tick:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Tick):
             return NotImplemented
-        told = [part.name for part in fields(self) if part.name not in ("solve_time", "resolved")]
+        told = [part.name for part in fields(self) if part.name not in ("solve_time", "resolved", "off_path")]
         names = (*told, "errors", "box")
         return all(same(getattr(self, name), getattr(other, name)) for name in names)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from qpsafe.compiled.compiled import Array, Vector, dot, entry, inline, readable, scale
+from qpsafe.compiled.compiled import Array, Vector, dot, entry, inline, scale
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, place
 
@@ -54,7 +54,16 @@ def pose_clik(state: RobotState, frame: str, rows: Index, gain: float, sample: A
     robot = state.robot
     J, result = np.empty((len(rows), robot.nq)), np.empty((2, len(rows)))
     _pose_clik(
-        state.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), rows, gain, pose, twist, J, result
+        state.memory,
+        robot.tree.supports,
+        robot.ends,
+        *robot.mounting(frame),
+        rows,
+        gain,
+        np.array(pose, order="C"),
+        np.array(twist),
+        J,
+        result,
     )
     return Clik(J, result[0], result[1])
 
@@ -125,14 +134,14 @@ def pose_rows(
                 J[i, j] = support[j] * twists[c, j]
 
 
-_read, _vector, _matrix = readable(1), types.Array(types.float64, 1, "C", readonly=True), readable(2)
+_vector = types.Array(types.float64, 1, "C", readonly=True)
 
 
 @entry(
     types.void(
         _vector, types.Array(types.float64, 2, "C", readonly=True), types.int64, types.int64,
         types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True),
-        types.float64, _matrix, _read, types.float64[:, ::1], types.float64[:, ::1],
+        types.float64, types.float64[:, ::1], types.float64[::1], types.float64[:, ::1], types.float64[:, ::1],
     ),
     kinematics,
 )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable
+from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline
 from qpsafe.tasks import clik
 from qpsafe.tasks.clik import rotation_vector
 
@@ -101,15 +101,15 @@ def displace_into(pose: Array, twist: Array, offset: Array, rate: Array, moved: 
     moving[3], moving[4], moving[5] = add(omega, 1.0, turning(v, (rate[3], rate[4], rate[5])))
 
 
-_any, _matrix, _out, _outs = readable(1), readable(2), types.float64[::1], types.float64[:, ::1]
+_out, _outs = types.float64[::1], types.float64[:, ::1]  # types as kernels have them: nothing is compiled twice
 
 
-@entry(types.void(_matrix, _matrix, _out), clik)
+@entry(types.void(_outs, _outs, _out), clik)
 def _offset(value: Array, pose: Array, offset: Array) -> None:
     offset_into(value, pose, offset)
 
 
-@entry(types.void(_matrix, _any, _any, _any, _outs, _out), clik)
+@entry(types.void(_outs, _out, _out, _out, _outs, _out), clik)
 def _displaced(pose: Array, twist: Array, offset: Array, rate: Array, moved: Array, moving: Array) -> None:
     displace_into(pose, twist, offset, rate, moved, moving)
 
@@ -117,7 +117,7 @@ def _displaced(pose: Array, twist: Array, offset: Array, rate: Array, moved: Arr
 def offset_of(value: Any, pose: Any) -> Array:
     """Offset (6,) [m, rad] of a pose (4, 4) from a reference pose (4, 4)."""
     offset = np.empty(6)
-    _offset(np.asarray(value, float), np.asarray(pose, float), offset)
+    _offset(np.array(value, dtype=float, order="C"), np.array(pose, dtype=float, order="C"), offset)
     return offset
 
 
@@ -131,5 +131,6 @@ def displaced(pose: Any, twist: Any, offset: Array, rate: Array) -> tuple[Array,
         rate: Of the offset (6,) [m/s, rad/s].
     """
     moved, moving = np.empty((4, 4)), np.empty(6)
-    _displaced(np.asarray(pose, float), np.asarray(twist, float), offset, rate, moved, moving)
+    own = [np.array(given, dtype=float, order="C") for given in (pose, twist, offset, rate)]
+    _displaced(*own, moved, moving)
     return moved, moving

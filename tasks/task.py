@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -171,14 +170,3 @@ class PoseTask(Task):
         """`clik` in one compiled call, for e = rows of (x_d - x, log(R_d Rᵀ))."""
         quick = pose_clik(state, self.frame, self._numbers, self.gain, sample)
         return Task.clik(self, state, sample) if quick is None else quick
-
-
-def errors_of(tasks: Sequence[Task], state: RobotState, time: float) -> tuple[NDArray[np.float64], ...]:
-    """Errors (rows,) of tasks against their own trajectories at a time on the path [s]; the caller's own arrays.
-
-    Args:
-        tasks: Highest priority first.
-        state: Where the robot is.
-        time: On the path [s].
-    """
-    return tuple([np.array(task.error(task.value(state), task.trajectory.sample(time))) for task in tasks])

@@ -110,6 +110,7 @@ BARE = {
     "irc5": "import qpsafe.irc5.messages",
     "mink": "import qpsafe.plugins.mink",
     "pink": "import qpsafe.plugins.pink",
+    "realsense": "from qpsafe.ranging.adapters.realsense import RealSense; RealSense('wall')",
     "models": "import qpsafe; qpsafe.load_robot('robot_descriptions:panda_description')",
 }
 WITH_SIM = {

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from qpsafe.recovery.return_kernel import DURATION as DURATION
+from qpsafe.recovery.return_kernel import KNOWN as KNOWN
+from qpsafe.recovery.return_kernel import PENDING as PENDING
+from qpsafe.recovery.return_kernel import RETURNING as RETURNING
+from qpsafe.recovery.return_kernel import SINCE as SINCE
+
 #: Joints, tasks, trajectories, spots, rows of all tasks, levels of danger, knots and events of all trajectories,
 #: floats of the robot's kinematics, links of its wire, floats and integers of the solver, of the solids that it keeps
 #: clear of and of the rows that this takes, and how many rows there may be; of the gate its
@@ -10,8 +16,8 @@ from __future__ import annotations
  CLEARANCE, CLEARANCE_WHOLE, ROOM, GATE, GATE_WHOLE, GATE_KNOWN, GATE_WORK, CAPSULES) = range(22)  # fmt: skip
 HEADS = 22
 
-#: Numbers of the rules and the law.
-(DT, SUSPEND, STEP, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,
+#: Numbers of the rules and the law: first those of `qpsafe.recovery.return_kernel`.
+(DT, KEPT, SPEED, ANGULAR_SPEED, JOINT_SPEED, SHORTEST, SUSPEND, STEP, TOLERANCE, FAR, CAP, DAMPING, DAMPING_TIME,
  WAY_DAMPING, WAY_DAMPING_TIME, WAY_GAIN, RETURN_SPEED, CALM, DWELL) = range(19)  # fmt: skip
 #: Whole ones: whether paths are suspended at all, looks of the stall watch and ticks between two, ticks between two
 #: looks at units, how many spots may be out of order, rows of the largest level, of a way back through the joints too,
@@ -22,14 +28,11 @@ FIXED, RESTS, CYCLES, ENDS = range(4)
 #: Floats of a knot of a trajectory: pose, twist, turn to the next knot and the turn's rate there.
 POSE, TWIST, TURN, TURN_RATE, KNOT = 0, 16, 22, 25, 28
 
-#: A robot's clock: time on the path, rate, how long danger has been small. A return: duration, time since its start.
+#: A robot's clock: time on the path, rate, how long danger has been small.
 TIME, RATE, QUIET = range(3)
-DURATION, SINCE = range(2)
 #: A robot's marks.
 (SEQ, ACTIVE, CHANGED, PAUSED, PHASE, STATUS, REASON, NOTES, WAITS, KEPT_LEVELS, LED, WAY, WAY_PHASE, WAY_CHANGED,
  MET_KNOWN, COMPARED_VALUES, STOPPED, DYING, OUT, UNIT_TICKS, FAR_POINTS, ODD, CAPPED, COUNT) = range(24)  # fmt: skip
-#: Of a task, or of the way: whether it has to come back, is on its way, and whether its last offset is known.
-PENDING, RETURNING, KNOWN = range(3)
 #: What a tick came to.
 CDF_N, M, F = range(3)
 

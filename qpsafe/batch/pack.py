@@ -20,7 +20,8 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.kinds import OTHER, WEIGHTED, kind_of, numbers_of
 from qpsafe.limits import JointLimits
 from qpsafe.pipeline.sense import Sense
-from qpsafe.recovery.recovery import RecoveryRules
+from qpsafe.recovery.returning import return_numbers
+from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.recovery.stall import BEHIND
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.task import PoseTask, Task
@@ -171,8 +172,8 @@ def _numbers(controller: SafetyController, paths: list[Path]) -> dict[str, Any]:
     farthest = controller._units.farthest if spots is not None else np.zeros(0)
     return {
         "numbers": (
-            dt, controller.activation.suspend_above, dt / rules.ramp, controller.recovery.kept, rules.speed,
-            rules.angular_speed, rules.joint_speed, rules.shortest, rules.tolerance, BEHIND * rules.tolerance,
+            *return_numbers(rules, dt), controller.activation.suspend_above, dt / rules.ramp, rules.tolerance,
+            BEHIND * rules.tolerance,
             controller.rules.speed_cap, damping, damping_time, way.damping, way.damping_time,
             JointTask(FixedJoints(robot.home)).gain, limits.return_speed,
             rules.calm * controller.activation.suspend_above, rules.dwell,

@@ -10,21 +10,13 @@ from qpsafe.batch import code
 from qpsafe.batch.reference_kernel import error_norm, event_time, measure, sample_all
 from qpsafe.compiled.compiled import Array, inline
 from qpsafe.recovery import steps
-from qpsafe.recovery.steps import BACK, DUE, FINITE, FOLLOWING, GO_ON, HOLD, MET, RECOVERING, SUSPENDED
+from qpsafe.recovery.return_kernel import JOINTS, MOVES, TURNS, copy, lead_back
+from qpsafe.recovery.steps import BACK, DUE, FINITE, FOLLOWING, MET, RECOVERING, SUSPENDED
 from qpsafe.tasks.joint import TURN
 from qpsafe.tasks.offset import displace_into
 
-_length, _return_time, _fading = inline(steps.length), inline(steps.return_time), inline(steps.fading)
 _quiet_after = inline(steps.quiet_after)
-_minimum_jerk, _run_out = inline(steps.minimum_jerk), inline(steps.run_out)
 START, SPEED_THEN, BEFORE = range(3)  # what is known of a task's offset
-
-
-@inline
-def copy(source: Array, target: Array) -> None:
-    """Copy a vector; a slice would make sure that they do not overlap."""
-    for j in range(source.shape[0]):
-        target[j] = source[j]
 
 
 @inline
@@ -97,91 +89,16 @@ def on_path(s: Any) -> bool:
 
 
 @inline
-def _too_fast(of: Any) -> bool:
-    """Whether a rate (6,) of a task's offset is above the peak speed of a return; see `RecoveryRules.too_fast`."""
-    p, rate, task = of
-    first = p.ends[task - 1] if task > 0 else 0
-    moves, turns = p.rows[first] < 3, p.rows[p.ends[task] - 1] >= 3
-    linear, angular = _length(rate[0], rate[1], rate[2]), _length(rate[3], rate[4], rate[5])
-    return (moves and not linear <= p.numbers[code.SPEED]) or (turns and not angular <= p.numbers[code.ANGULAR_SPEED])
-
-
-@inline
-def _largest(vector: Array) -> float:
-    most = 0.0
-    for j in range(vector.shape[0]):
-        most = max(most, abs(vector[j]))
-    return most
-
-
-@inline
-def _too_fast_joints(of: Any) -> bool:
-    p, rate = of
-    return not _largest(rate) <= p.numbers[code.JOINT_SPEED]
-
-
-@inline
-def _rate_into(offset: Array, before: Array, known: int, dt: float, rate: Array) -> None:
-    for j in range(offset.shape[0]):
-        rate[j] = (offset[j] - before[j]) / dt if known == 1 else 0.0
-        before[j] = offset[j]
-
-
-@inline
-def _set_out(
-    back: Array, marks: Array, start: Array, speed: Array, offset: Array, rate: Array, duration: float
-) -> None:
-    back[code.DURATION], back[code.SINCE] = duration, 0.0
-    marks[code.RETURNING] = 1
-    copy(offset, start)
-    copy(rate, speed)
-
-
-@inline
-def _fade(back: Array, marks: Array, start: Array, speed: Array, offset: Array, rate: Array) -> bool:
-    """Offset and rate of a return at its time; False where it is over."""
-    if back[code.SINCE] >= back[code.DURATION]:
-        marks[code.RETURNING] = marks[code.PENDING] = 0
-        return False
-    share = back[code.SINCE] / back[code.DURATION]
-    (s, ds), (r, dr) = _minimum_jerk(share), _run_out(share)
-    a, b, c, d = _fading(s, ds, r, dr, back[code.DURATION])
-    for j in range(offset.shape[0]):
-        offset[j], rate[j] = a * start[j] + b * speed[j], c * start[j] + d * speed[j]
-    return True
-
-
-@inline
-def _hold(marks: Array, kept: float, rate: Array) -> None:
-    """Held, not pulled: its motion runs out."""
-    marks[code.RETURNING] = 0
-    for j in range(rate.shape[0]):
-        rate[j] = kept * rate[j]
-
-
-@inline
 def _reference(p: Any, s: Any, w: Any, k: int, active: bool, goal: Array, twist: Array) -> None:
     """Displace the reference of a pending task that stands in `goal` and `twist`."""
-    rate, offset = w.drift[:6], w.shift[:6]
+    rate, offset, first = w.drift[:6], w.shift[:6], p.ends[k - 1] if k > 0 else 0
     copy(w.offsets[k], offset)
-    start, speed, before = s.offsets[START, k], s.offsets[SPEED_THEN, k], s.offsets[BEFORE, k]
-    _rate_into(offset, before, s.tasks[k, code.KNOWN], p.numbers[code.DT], rate)
-    s.tasks[k, code.KNOWN] = 1
-    way = _way_on(s.tasks[k, code.RETURNING] == 1, active, (p, rate, k))
-    if way == HOLD:
-        _hold(s.tasks[k], p.numbers[code.KEPT], rate)
-    else:
-        if way == GO_ON:
-            s.returns[k, code.SINCE] += p.numbers[code.DT]
-        else:
-            shift = _length(offset[0], offset[1], offset[2]) / p.numbers[code.SPEED]
-            turn = _length(offset[3], offset[4], offset[5]) / p.numbers[code.ANGULAR_SPEED]
-            duration = _return_time(max(shift, turn), p.numbers[code.SHORTEST])
-            _set_out(s.returns[k], s.tasks[k], start, speed, offset, rate, duration)
-        if not _fade(s.returns[k], s.tasks[k], start, speed, offset, rate):
-            return
-    pose = w.goals[p.paths[k]]
-    displace_into(pose, twist, offset, rate, goal, twist)
+    kind = (MOVES if p.rows[first] < 3 else 0) + (TURNS if p.rows[p.ends[k] - 1] >= 3 else 0)
+    if lead_back(
+        p.numbers, kind, active, offset, rate, s.tasks[k], s.returns[k], s.offsets[START, k], s.offsets[SPEED_THEN, k],
+        s.offsets[BEFORE, k],
+    ):  # fmt: skip
+        displace_into(w.goals[p.paths[k]], twist, offset, rate, goal, twist)
 
 
 @inline
@@ -194,7 +111,6 @@ def _answer_way(question: int, of: Any, time: float) -> bool:
 
 _next_phase, _advance = (inline(step) for step in steps.phases_by(_answer))
 _next_phase_of_way = inline(steps.phases_by(_answer_way)[0])
-_way_on, _way_on_joints = inline(steps.ways_by(_too_fast)), inline(steps.ways_by(_too_fast_joints))
 
 
 @inline
@@ -217,27 +133,12 @@ def update_way(p: Any, s: Any, w: Any, least: float) -> bool:
     if phase == FOLLOWING:
         s.marks[code.WAY] = 0  # there: what is left is the way from a posture that met the tasks
         return False
-    for j in range(n):
-        rate[j] = 0.0
-    if s.way_marks[code.PENDING] == 1:
-        start, speed, before = s.way_offsets[START], s.way_offsets[SPEED_THEN], s.way_offsets[BEFORE]
-        _rate_into(offset, before, s.way_marks[code.KNOWN], p.numbers[code.DT], rate)
-        s.way_marks[code.KNOWN] = 1
-        way = _way_on_joints(s.way_marks[code.RETURNING] == 1, active, (p, rate))
-        there = False
-        if way == HOLD:
-            _hold(s.way_marks, p.numbers[code.KEPT], rate)
-        else:
-            if way == GO_ON:
-                s.way[code.SINCE] += p.numbers[code.DT]
-            else:
-                duration = _return_time(_largest(offset) / p.numbers[code.JOINT_SPEED], p.numbers[code.SHORTEST])
-                _set_out(s.way, s.way_marks, start, speed, offset, rate, duration)
-            there = not _fade(s.way, s.way_marks, start, speed, offset, rate)
-        if there:
-            offset[:], rate[:] = 0.0, 0.0
-    else:
-        offset[:] = 0.0
+    there = s.way_marks[code.PENDING] == 0 or not lead_back(
+        p.numbers, JOINTS, active, offset, rate, s.way_marks, s.way, s.way_offsets[START], s.way_offsets[SPEED_THEN],
+        s.way_offsets[BEFORE],
+    )  # fmt: skip
+    if there:
+        offset[:], rate[:] = 0.0, 0.0
     return True
 
 

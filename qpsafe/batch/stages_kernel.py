@@ -38,7 +38,7 @@ from qpsafe.pipeline.sense_kernel import (
     sense_points,
     sense_readings,
 )
-from qpsafe.recovery import stall, steps
+from qpsafe.recovery import return_kernel, stall, steps
 from qpsafe.recovery.steps import RECOVERING
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
@@ -58,8 +58,8 @@ _parts, _given = inline(parts), inline(given)
 #: All the code that goes into the kernel.
 USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
-    limits_module, braking, resolve_kernel, sense_kernel, stall, steps, kinematics, speed_cap, units, clik, offset,
-    detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
+    limits_module, braking, resolve_kernel, sense_kernel, stall, steps, return_kernel, kinematics, speed_cap, units,
+    clik, offset, detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
     regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 

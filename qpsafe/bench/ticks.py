@@ -9,6 +9,7 @@ import numpy as np
 
 from qpsafe.batch.controller import BatchController
 from qpsafe.bench.clock import Row
+from qpsafe.bench.images import arrays, dense
 from qpsafe.controller import SafetyController
 from qpsafe.danger.field import DangerField
 from qpsafe.laws.hierarchical import HierarchicalLaw
@@ -26,6 +27,8 @@ from qpsafe.tasks.trajectory import FixedPose
 
 #: What a robot with its own sensors runs; everything else is beside it.
 MAIN = "whole tick, 20 distances"
+#: The same with arrays in place of spots; and one image of a depth camera.
+ARRAYS, DENSE = "whole tick, 20 arrays of 64 zones at 15 Hz", "one depth image, 640 x 480, reduced"
 #: Robots of a batch.
 ROBOTS = 1000
 
@@ -44,6 +47,8 @@ def rows() -> dict[str, Row]:
         "a robot of a batch of 1000, one core": Row(batch(1), share=ROBOTS),
         "a robot of a batch of 1000, two cores": Row(batch(2), share=ROBOTS),
         "a robot of a batch of 1000, nobody in sight, one core": Row(batch(1, np.inf), share=ROBOTS),
+        ARRAYS: Row(arrays()),
+        DENSE: Row(dense()),
         "danger field, 20 points x 6 links": Row(danger_field()),
         "sensing, 20 spots, all filters": Row(sensing()),
     }

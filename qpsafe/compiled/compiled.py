@@ -85,7 +85,9 @@ seconds: dict[str, float] = {}
 """Processor time [s] that compiling each kernel, or loading it from the cache, took in this process."""
 
 
-def entry(types_: Any, *uses: ModuleType, nogil: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def entry(
+    types_: Any, *uses: ModuleType, nogil: bool = False, python: bool = True
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile for one signature at import, from numba's cache where this machine has a place for one.
 
     Args:
@@ -93,8 +95,9 @@ def entry(types_: Any, *uses: ModuleType, nogil: bool = False) -> Callable[[Call
         uses: Other modules whose compiled code goes into this one, beside this and `memory`. numba's cache notices
             changes of the entry's own file only; so the name it is kept under tells the state of these.
         nogil: Whether other threads may run meanwhile; memory that is handed in must then be the thread's own.
+        python: Whether Python calls it; else only other compiled code does, by `linked`.
     """
-    options = {**OPTIONS, "nogil": nogil}
+    options = {**OPTIONS, "nogil": nogil, "no_cpython_wrapper": not python}
 
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         kernel = f"{function.__module__}.{function.__name__}"

@@ -136,7 +136,11 @@ class Activation(Fixed):
         self.counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))
         n = len(self.levels)
         self._names = REGIME_NAMES.get(n, ("high", *(f"medium-{kept}" for kept in range(1, n)), "low"))
+        self._plain = all(type(threshold) is Threshold for threshold in self.levels)
+        self._numbers = [(level.start, level.end, level.delta, level.epsilon) for level in self.levels]
         self._calm = Switching((1.0,) * n, (1.0,) * len(self.thresholds), self._names[-1])
+        self._released = Switching((0.0,) * n, (0.0,) * len(self.thresholds), self._names[0])
+        self._least, self._most = self.levels[-1].start, self.levels[0].end if self._plain else math.inf
         for k in range(len(self.thresholds) - 1):
             upper, lower = self.thresholds[k], self.thresholds[k + 1]
             if lower != upper and lower.end > upper.start:
@@ -176,15 +180,15 @@ class Activation(Fixed):
                 expected = f"1 >= a_1 >= ... >= 0 for {counted(len(self.thresholds), 'task')}"
                 raise ValueError(f"the activations are {found}, expected {expected}")
             return Switching(self.switches(cdf_n), found, self.regime(cdf_n))
-        if cdf_n <= self.levels[-1].start:  # below the lowest threshold
+        if cdf_n <= self._least:  # below the lowest threshold
             return self._calm
-        switches, kept = [], 0
-        for threshold in self.levels:
-            if cdf_n <= threshold.start:
-                switches.append(1.0)
-                kept += 1
-            else:
-                switches.append(threshold(cdf_n))
+        if cdf_n >= self._most:  # beyond the highest one
+            return self._released
+        if self._plain:
+            switches = [switch(cdf_n, *numbers) for numbers in self._numbers]
+        else:
+            switches = [1.0 if cdf_n <= level.start else level(cdf_n) for level in self.levels]
+        kept = sum([cdf_n <= numbers[0] for numbers in self._numbers])
         activations = multiply(switches, self.counts, [1.0] * len(self.thresholds))
         return Switching(tuple(switches), tuple(activations), self._names[kept])
 

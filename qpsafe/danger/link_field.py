@@ -196,10 +196,10 @@ def danger_field(
     value[:], gradient[:] = 0.0, 0.0
     for i in range(r0.shape[0]):
         a, b, va, vb = row(r0, i), row(r1, i), row(v0, i), row(v1, i)
-        motion = motion_of(va, vb)
+        own = motion_of(va, vb)
         for j in range(points.shape[0]):
-            if moving:
-                vp = row(point_velocities, j)
+            motion, vp = own, row(point_velocities, j) if moving else (0.0, 0.0, 0.0)
+            if vp[0] != 0.0 or vp[1] != 0.0 or vp[2] != 0.0:  # true for NaN
                 motion = motion_of(add(va, -1.0, vp), add(vb, -1.0, vp))
             c, g = _link(row(points, j), a, b, motion, k, floor)
             value[j] += c

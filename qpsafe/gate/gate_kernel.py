@@ -6,6 +6,8 @@ verified already: its way is the rest of the last command's, and nobody's ball i
 
 from __future__ import annotations
 
+from math import inf
+
 from numba import types
 
 from qpsafe.compiled import by_reference as reference_module
@@ -43,7 +45,7 @@ def _passes(t, w, known, q, v, points, told):  # type: ignore[no-untyped-def]
     if group >= 0:
         told[CAUSE], told[WHO], told[POINT] = SOLID_NEAR, group, w.found[7]
         return False
-    if points.shape[0] > 0 and people_excess(t, w, q, v, points, False) > 0.0:
+    if points.shape[0] > 0 and people_excess(t, w, q, v, points, 0.0) > 0.0:
         told[CAUSE], told[WHO], told[POINT] = PERSON_NEAR, w.worst[0], w.worst[1]
         return False
     return True
@@ -125,7 +127,7 @@ def let_through(
         for option in range(2):
             for j in range(n):
                 w.trial[j] = w.brake[j] if option == 0 else command[j]
-            excess = people_excess(t, w, q, w.trial, points, True)
+            excess = people_excess(t, w, q, w.trial, points, inf)
             if option == 0:
                 told[SHORT] = excess
             elif excess < told[SHORT] and touched(t, w, known, q, command) < 0:

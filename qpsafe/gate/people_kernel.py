@@ -124,7 +124,7 @@ def _hot(t: Any, v: Array, ages: Array, away: Array, hot: Index) -> int:
 
 
 @inline
-def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, to_the_end: bool) -> float:
+def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, enough: float) -> float:
     """By how much a command's way approaches people too fast: sum over ticks and pairs of what is above v_s, times dt.
 
     Args:
@@ -133,7 +133,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, to_the_end:
         q: Where the robot is (n,) [rad].
         v: The command (n,) [rad/s].
         points: Seen (p, 3) [m].
-        to_the_end: Whether all of it is summed up; else the first excess is returned.
+        enough: Excess at which it is returned [m]; infinite to sum up all of it.
 
     The first capsule and point concerned are left in `w.worst`.
     """
@@ -184,7 +184,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, to_the_end:
                 if excess == 0.0:
                     w.worst[0], w.worst[1] = c, k
                 excess += over * dt
-                if not to_the_end:
+                if excess > enough:
                     return excess
             ahead = min(ahead, steps)
         count, tick = left, tick + ahead

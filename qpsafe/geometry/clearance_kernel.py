@@ -83,7 +83,7 @@ def _normal(p: Vector, o: Vector, d: float, along: Array) -> Vector:
 
 @inline
 def _further(
-    t: Any, r: Any, poses: Array, twists: Array, qd: Array, pair: int, first: bool, p: Vector, n: Vector, d: float,
+    t: Any, r: Any, poses: Array, twists: Array, qd: Array, pair: int, i: int, j: int, p: Vector, n: Vector, d: float,
     dt: float,
 ) -> None:  # fmt: skip
     """Rows of other points of one shape of a pair, against all of the other shape: those that lean towards it.
@@ -92,12 +92,11 @@ def _further(
 
     Args:
         t, r, poses, twists, qd, pair, dt: As for `clearance_rows`.
-        first: Whether the points are of the first shape.
-        p: Its nearest point.
+        i, j: The shape whose points they are, and the other one.
+        p: Nearest point of shape i.
         n: Normal from it to the other shape.
         d: Distance.
     """
-    i, j = (t.pairs[pair, 0], t.pairs[pair, 1]) if first else (t.pairs[pair, 1], t.pairs[pair, 0])
     a, b = t.index[i, BODY], t.index[j, BODY]
     T, size = poses[a], view(r.pair, 2 * (43 + WORK), (FLOATS,))
     A, B = view(r.pair, 43 + WORK, (12,)), view(r.pair, 43 + WORK + 12, (12,))
@@ -176,8 +175,8 @@ def _pair_rows(t: Any, r: Any, poses: Array, twists: Array, qd: Array, pair: int
     _take(t, r, twists, qd, pair, a, b, p, o, n, d, dt)
     if not 0.0 < d < CLOSE:
         return
-    _further(t, r, poses, twists, qd, pair, True, p, n, d, dt)
-    _further(t, r, poses, twists, qd, pair, False, o, (-n[0], -n[1], -n[2]), d, dt)
+    _further(t, r, poses, twists, qd, pair, i, j, p, n, d, dt)
+    _further(t, r, poses, twists, qd, pair, j, i, o, (-n[0], -n[1], -n[2]), d, dt)
 
 
 _one, _whole = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)

@@ -104,7 +104,7 @@ def passes(t: Any, r: Any, twists: Array, qd: Array, a: int, shape: int, c: Vect
     for k in range(first, first + count):
         n = (-t.planes[k, 0], -t.planes[k, 1], -t.planes[k, 2])
         gap = t.planes[k, 3] - dot(n, c) - size - margin
-        if gap > 0.0 and gap > along_normal(t, r, twists, qd, a, 0, c, c, size, n):
+        if gap > 0.0 and gap > along_normal(t, r, twists, qd, a, t.index[shape, BODY], c, c, size, n):
             return True
     return False
 

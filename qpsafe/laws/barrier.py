@@ -7,13 +7,12 @@ The person's own motion is not in it: the cap holds for what the robot adds.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.field import DangerField
-from qpsafe.danger.kinetic import velocity_gradient
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
@@ -65,6 +64,12 @@ class DangerBarrier(Fixed):
             raise ConfigurationError("DangerBarrier", "points", points, "at least 1")
         self.delta_max, self.horizon, self.points = float(delta_max), float(horizon), int(points)
         self.field = DangerField() if field is None else field
+        self.__setstate__({})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Copies, too, compile what they need when they are made, not within the first tick."""
+        super().__setstate__(state)
+        import qpsafe.danger.kinetic  # noqa: F401
 
     def __repr__(self) -> str:
         return call(self, self.delta_max, horizon=self.horizon, points=self.points)
@@ -120,6 +125,8 @@ class DangerBarrier(Fixed):
         if np.abs(qd).max() < _REST:
             return np.zeros((len(points), len(qd)))
         wire, (starts, stops), J = state.wire(qd), state.robot.wire_indices, state.wire_jacobians()
+        from qpsafe.danger.kinetic import velocity_gradient  # not compiled where there is no barrier
+
         by_velocity = np.empty((len(points), len(wire.starts), 2, 3))
         velocity_gradient(points, *wire, self.field.kinetic, self.field.gamma, self.field.floor, by_velocity)
         gradient: Array = np.einsum("plc,lcn->pn", by_velocity[:, :, 0], J[starts])

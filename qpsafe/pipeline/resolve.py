@@ -25,6 +25,7 @@ from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
+from qpsafe.recovery.returning import Led
 from qpsafe.tasks.task import PoseTask
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ class Resolve:
         self._robot, self._dt = robot, dt
         #: Rows of each task that the compiled call fills in, None for the others.
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
+        self._counts = tuple([len(rows) for rows in self._rows if rows is not None])
         self._kind = kind_of(law, len(tasks))
         *damping, importance = numbers_of(law, len(tasks)) if self._kind != OTHER else (0.0, 0.0, ())
         self._numbers = (*damping, np.array(importance))
@@ -131,10 +133,11 @@ class Resolve:
             for task, rows in zip(tasks, self._rows, strict=True)
         ]
         self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
+        self._weighed: tuple[Any, list[float]] = (), []  # the last activations, and what they weigh
         self._layouts: dict[tuple[int, ...], tuple[Any, ...]] = {}
 
     def __call__(
-        self, state: RobotState, qd: Array, qdd: Array, samples: Sequence[Any], qd0: Array,
+        self, state: RobotState, qd: Array, before: Array, samples: Sequence[Any], qd0: Array,
         activations: tuple[float, ...], limits: JointLimits | None, soft: tuple[Level, ...] = (),
     ) -> Resolved:  # fmt: skip
         """Resolve one tick.
@@ -142,7 +145,7 @@ class Resolve:
         Args:
             state: Commanded configuration.
             qd: Commanded velocity (n,) [rad/s].
-            qdd: Acceleration that led to it (n,) [rad/s²].
+            before: The one a tick before (n,) [rad/s].
             samples: Reference of every task.
             qd0: Evasive velocity (n,) [rad/s].
             activations: Of the tasks.
@@ -172,12 +175,19 @@ class Resolve:
         command, floats, integers = np.empty(len(qd)), np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
         plain = type(limits) is JointLimits and limits.max_jerk is None
         if asked or not plain:
-            box = None if plain or limits is None else limits.box(state.q, qd, qdd)
+            box = None if plain or limits is None else limits.box(state.q, qd, (qd - before) / self._dt)
             if limits is not None and type(limits) is not JointLimits:
                 box = checked_box(box, limits, state.q, qd)
-            self._fill(Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1)), asked, counts, box)
+            self._fill(floats, asked, counts)
+            if box is not None:
+                cut = Parts(*parts(floats, integers, len(qd), len(rows), len(counts) + 1))
+                cut.bounds[0], cut.bounds[1] = box.lower, box.upper
+                cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        self._qd0[:], weights = qd0, weigh(activations, self._weights).tolist()
+        self._qd0[:] = qd0
+        if activations is not self._weighed[0] or type(activations) is not tuple:
+            self._weighed = activations, weigh(activations, self._weights).tolist()
+        weights = self._weighed[1]
         damping = self._numbers[:2] if ours and self._kind == STRICT else (np.nan, np.nan)
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
@@ -201,6 +211,9 @@ class Resolve:
     def _take(self, state: RobotState, samples: Sequence[Any]) -> tuple[tuple[int, ...], dict[int, Clik]]:
         """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
         asked: dict[int, Clik] = {}
+        if type(samples) is Led and not samples.asked and None not in self._rows:  # at once
+            self._goals[:], self._twists[:], self._standing[:] = samples.goals, samples.twists, 0.0
+            return self._counts, asked
         counts = []
         for k, (task, rows, sample) in enumerate(zip(self.parts[0], self._rows, samples, strict=True)):
             if rows is not None:
@@ -227,18 +240,22 @@ class Resolve:
         layout = layout_for(n, counts, self._kind == WEIGHTED, room)
         return rows, layout, sizes_of(n, len(rows), len(counts) + 1, room)
 
-    @staticmethod
-    def _fill(cut: Parts, asked: dict[int, Clik], counts: tuple[int, ...], box: Box | None) -> None:
-        """Write down what parts of another making answered."""
-        ends = [0, *accumulate(counts)]
+    def _fill(self, floats: Array, asked: dict[int, Clik], counts: tuple[int, ...]) -> None:
+        """Write down what tasks of another making answered, where `Parts` has A, b and e."""
+        n, ends = self._robot.nq, [0, *accumulate(counts)]
+        b, e = ends[-1] * n, ends[-1] * (n + 1)
         for k, clik in asked.items():
-            rows, count = slice(ends[k], ends[k + 1]), (counts[k],)
-            cut.A[rows] = reals(f"the Jacobian of task {k + 1}", clik.jacobian, (counts[k], cut.A.shape[1]))
-            cut.b[rows] = reals(f"the velocity of task {k + 1}", clik.velocity, count)
-            cut.e[rows] = reals(f"the error of task {k + 1}", clik.error, count)
-        if box is not None:
-            cut.bounds[0], cut.bounds[1] = box.lower, box.upper
-            cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
+            first, stop = ends[k], ends[k + 1]
+            self._put(floats[first * n : stop * n].reshape(-1, n), clik.jacobian, "Jacobian", k)
+            self._put(floats[b + first : b + stop], clik.velocity, "velocity", k)
+            self._put(floats[e + first : e + stop], clik.error, "error", k)
+
+    @staticmethod
+    def _put(place: Array, value: Any, what: str, k: int) -> None:
+        """Write down what task k answered, if it is an array of real numbers of this shape."""
+        if not (type(value) is np.ndarray and value.dtype == _FLOAT and value.shape == place.shape):
+            value = reals(f"the {what} of task {k + 1}", value, place.shape)
+        place[...] = value
 
     def _by_law(
         self, made: Resolved, state: RobotState, activations: tuple[float, ...], soft: tuple[Level, ...]

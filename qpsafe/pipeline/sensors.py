@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 
+_NONE: tuple[str, ...] = ()
+
+
 class Sensors:
     """What a `SafetyController` sees with; given at construction."""
 
@@ -86,7 +89,7 @@ class Sensors:
 
     def _unseen(self) -> tuple[str, tuple[str, ...]]:
         """Severity of sick sensors, and names of those that cannot be trusted now."""
-        severity, names = CLEAR, tuple[str, ...]()
+        severity, names = CLEAR, _NONE
         if self._sensing is not None:
             severity, names = self._sensing.health.severity, self._sensing.unseen
         if self._ranging is not None:

@@ -100,14 +100,14 @@ class Stages:
             measured: Joint position (n,) [rad].
             seen: Detected points and their danger.
             resolve: The half of the tick.
-            given: Commanded state, velocity, acceleration, samples, q̇0, activations, limits and soft levels, as
+            given: Commanded state, velocity, the one before, samples, q̇0, activations, limits and soft levels, as
                 `resolve` takes them.
         """
         state = self._robot.at(measured)
-        commanded, qd, qdd, samples, qd0, active, limits, soft = given
+        commanded, qd, before, samples, qd0, active, limits, soft = given
         level = barrier.level(state, qd, seen.points, seen.danger)
         soft = (*soft, level) if level else soft
-        resolved = resolve(commanded, qd, qdd, samples, qd0, active, limits, soft)
+        resolved = resolve(commanded, qd, before, samples, qd0, active, limits, soft)
         # exact, as far as the acceleration limits allow
         command = barrier.scale(state, resolved.command, seen.points).factor * resolved.command
         resolved.command = command if resolved.box is None else resolved.box.clip(command)

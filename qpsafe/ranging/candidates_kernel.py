@@ -195,3 +195,19 @@ def choose(
         for i in range(count):
             if links[i] == link and used[0, sensors[i], link] >= most:
                 marks[i] = 1
+
+
+@entry(types.int64(types.float64[:, :, ::1], _whole, types.int64, types.float64, types.int64[:, ::1]))
+def lost_before(store: Array, counts: Index, who: int, stamp: float, found: Index) -> int:
+    """Fill `found` (n, 2) with sensor and row of the points that others than `who` have lost, seen before `stamp`.
+
+    Returns:
+        n.
+    """
+    count = 0
+    for s in range(store.shape[0]):
+        for i in range(counts[s] if s != who else 0):
+            if store[s, i, LOST] < inf and store[s, i, STAMP] < stamp:
+                found[count, 0], found[count, 1] = s, i
+                count += 1
+    return count

@@ -38,14 +38,21 @@ class Configurations:
 
         Before the first one it is that one, after the last one the last.
         """
-        count = len(self._times)
-        # times in order: those after `_next` are the oldest
-        turn = self._next % count
-        times = np.concatenate((self._times[turn:], self._times[:turn])) if self._next > count else self._times[:turn]
-        later = int(np.searchsorted(times, time))
-        first = turn if self._next > count else 0
-        if later == 0 or later == len(times):
-            return self._qs[(first + min(later, len(times) - 1)) % count].copy()
-        a, b = (first + later - 1) % count, (first + later) % count
-        share = (time - self._times[a]) / (self._times[b] - self._times[a])
+        count, latest = len(self._times), self._next - 1
+        oldest, times = max(self._next - count, 0), self._times
+        later, last = latest, float(times[latest % count])
+        if time >= last:
+            return self._qs[latest % count].copy()
+        if latest > oldest:  # ticks are even, nearly: about here
+            step = last - float(times[(latest - 1) % count])
+            later = max(latest - int(min((last - time) / max(step, 1e-9), latest - oldest)), oldest)
+        while later < latest and times[later % count] < time:
+            later += 1
+        while later > oldest and times[(later - 1) % count] >= time:
+            later -= 1
+        b = later % count
+        if later == oldest:
+            return self._qs[b].copy()
+        a = (later - 1) % count
+        share = (time - times[a]) / (times[b] - times[a])
         return np.asarray(self._qs[a] + share * (self._qs[b] - self._qs[a]))

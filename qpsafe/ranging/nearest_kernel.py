@@ -1,4 +1,4 @@
-"""The points that are nearest to the links of a robot's wire, spread apart; compiled."""
+"""The points nearest to the links of a robot's wire, spread apart; and whether an image is the last one again."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import inf
 
 from numba import types
 
-from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, row
+from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row
 from qpsafe.robot.kinematics import Index
 
 
@@ -67,3 +67,12 @@ def reduce_points(
         for k in range(starts.shape[0]):
             away[k, i] = to_link((points[i, 0], points[i, 1], points[i, 2]), starts, ends, k)
     return keep_nearest(points, points.shape[0], away, marks, each, spread, kept)
+
+
+@entry(types.boolean(readable(1), readable(1)))
+def same_numbers(a: Array, b: Array) -> bool:
+    """Whether two arrays hold the same numbers; NaN is the same as NaN."""
+    same = a.shape[0] == b.shape[0]
+    for i in range(a.shape[0] if same else 0):
+        same = same and (a[i] == b[i] or (a[i] != a[i] and b[i] != b[i]))
+    return same

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.field import DangerField
-from qpsafe.fixed import Fixed
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
 from qpsafe.ranging.checks import checked_sensors
 from qpsafe.ranging.configurations import Configurations
@@ -23,10 +22,10 @@ from qpsafe.ranging.tracking.prediction import Foresight
 from qpsafe.ranging.tracking.velocities import MOST, Velocities
 from qpsafe.ranging.unseen import Together
 from qpsafe.ranging.watch import LATE, SensorWatch
-from qpsafe.sensing.body import body_hull_set, fixed_to
+from qpsafe.sensing.body import surrounding_hulls
 from qpsafe.sensing.detection import BadInput
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
-from qpsafe.sensing.hulls import HullSet, Obstacle
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ Array = NDArray[np.float64]
 AHEAD = 0.5
 
 
-class RangeSensing(Fixed):
+class RangeSensing:
     """Takes images as they come, and tells every tick what of them counts.
 
     Args:
@@ -56,21 +55,15 @@ class RangeSensing(Fixed):
         ConfigurationError: No sensors, two of one name, or one that does not fit the robot.
     """
 
-    fixed = frozenset(("sensors", "rules", "sensing"))
-
     def __init__(
         self, robot: Robot, sensors: Sequence[RangeSensor], sensing: SensingRules | None = None,
         rules: RangeRules | None = None, known: Sequence[Obstacle] = (),
         carried: Mapping[str, Sequence[Obstacle]] | None = None, others: int = 0,
     ) -> None:  # fmt: skip
-        self.sensors = checked_sensors(sensors, robot)
-        self.sensing = SensingRules() if sensing is None else sensing
-        self.rules = RangeRules() if rules is None else rules
-        hulls = HullSet([(0, thing.name, thing.vertices) for thing in known])
-        if self.sensing.self_detection:
-            hulls = hulls + body_hull_set(robot)
-        for frame, things in ({} if carried is None else carried).items():
-            hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
+        self._sensors = checked_sensors(sensors, robot)
+        self._sensing = SensingRules() if sensing is None else sensing
+        self._rules = RangeRules() if rules is None else rules
+        hulls = surrounding_hulls(robot, self.sensing.self_detection, known, carried)
         self._robot, count, links = robot, len(self.sensors), len(robot.wire_frames)
         self._judges = [Judge(sensor) for sensor in self.sensors]
         self._watches = [SensorWatch(sensor, self.rules, self.sensing) for sensor in self.sensors]
@@ -97,7 +90,12 @@ class RangeSensing(Fixed):
         self._together: Together | None = None
         if count > 1 or self.rules.unseen == OCCUPIED:
             self._together = Together(
-                self._reducers, self.sensing.tolerance, self.rules.deviations, hulls, self.sensing.approach_speed
+                self._reducers,
+                self.sensing.tolerance,
+                self.rules.deviations,
+                hulls,
+                self.sensing.approach_speed,
+                total,
             )
         self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
@@ -106,6 +104,21 @@ class RangeSensing(Fixed):
         self._inbox = Inbox(self.sensors, self.rules.budget)
         self._now, self._seen = 0.0, np.zeros(count)
         self.reset()
+
+    @property
+    def sensors(self) -> tuple[RangeSensor, ...]:
+        """Whose images are taken."""
+        return self._sensors
+
+    @property
+    def rules(self) -> RangeRules:
+        """Numbers for images."""
+        return self._rules
+
+    @property
+    def sensing(self) -> SensingRules:
+        """Times and tolerances."""
+        return self._sensing
 
     @property
     def room(self) -> int:

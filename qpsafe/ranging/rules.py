@@ -41,7 +41,7 @@ class RangeRules(Fixed):
     """
 
     def __init__(
-        self, most: int = 1, *, apart: float = 0.08, each: int = 2, spread: float = 0.04, reach: float = 1.0,
+        self, most: int = 1, *, apart: float = 0.08, each: int = 1, spread: float = 0.04, reach: float = 1.0,
         deviations: float = 3.0, through: float = 0.3, few: int = 4, misplaced: int = 3, dense: int = 5000,
         support: int = 3, budget: int = 400_000, predict: bool = True, horizon: float = 0.0,
         acceleration: float = 1.0, fastest: float = 2.5, unseen: str = FREE,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.ranging.candidates_kernel import LOST, STAMP, WRONG
+from qpsafe.ranging.candidates_kernel import LOST, STAMP, WRONG, lost_before
 from qpsafe.ranging.fusion import LookingThrough
 from qpsafe.sensing.hulls import HullSet
 
@@ -50,16 +50,18 @@ class Together:
         deviations: By how many standard deviations a reading may be wrong.
         hulls: The robot itself and known obstacles: nobody is in them.
         person: How fast people come [m/s].
+        room: How many points all sensors have at most.
     """
 
     def __init__(
-        self, reducers: list[Reducer], tolerance: float, deviations: float, hulls: HullSet, person: float
+        self, reducers: list[Reducer], tolerance: float, deviations: float, hulls: HullSet, person: float, room: int
     ) -> None:
         self._lookers = [LookingThrough(reducer.zones, tolerance, deviations) for reducer in reducers]
         self._hulls, self._person, self._tolerance = hulls, person, tolerance
         self._reach = [reducer.zones.range_max for reducer in reducers]
         self._covers = [reducer.zones.covers for reducer in reducers]
         self._reducers = reducers
+        self._found = np.empty((room, 2), dtype=np.int64)
         self.reset()
 
     def reset(self) -> None:
@@ -80,15 +82,13 @@ class Together:
         """
         reducer = self._reducers[who]
         self.views[who] = View(stamp, pose, reducer.distances.copy(), reducer.valid.copy(), reducer.sigma)
-        there = np.arange(store.shape[1]) < counts[:, None]
-        lost = there & (store[:, :, LOST] < np.inf) & (store[:, :, STAMP] < stamp)
-        lost[who] = False
-        if lost.any():
-            points = store[lost]
+        count = lost_before(store, counts, who, stamp, self._found)
+        if count:
+            sensors, rows = self._found[:count].T
+            points = store[sensors, rows]
             errors = points[:, WRONG] + self._person * (stamp - points[:, STAMP])
             through = self._through(who, np.ascontiguousarray(points[:, :3]), errors)
-            points[through, LOST] = -np.inf
-            store[lost] = points
+            store[sensors[through], rows[through], LOST] = -np.inf
 
     def _through(self, who: int, points: Array, errors: Array) -> NDArray[np.bool_]:
         view = self.views[who]

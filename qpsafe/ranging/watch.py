@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.ranging.nearest_kernel import same_numbers
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ class SensorWatch:
         return wrong
 
     def _is_frozen(self, stamp: float, distances: Array, shown: Shown, where: Array) -> bool:
-        same = shown.hits > 0 and np.array_equal(distances, self._last, equal_nan=True)
+        same = shown.hits > 0 and same_numbers(distances, self._last)
         if not same:
             self._last, self._where, self._since, self._same = distances.copy(), where, stamp, 0
             return False

@@ -6,7 +6,6 @@ following ──danger above Δ(1-ε)──> suspended ──danger small for a 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -16,8 +15,11 @@ from numpy.typing import NDArray
 
 from qpsafe.recovery import steps
 from qpsafe.recovery.events import Cursor
-from qpsafe.recovery.returns import RecoveryRules, Return
-from qpsafe.recovery.steps import FINITE, HOLD, MET, PHASES, SET_OUT, quiet_after
+from qpsafe.recovery.return_kernel import KEPT
+from qpsafe.recovery.returning import Led, Returns, return_numbers
+from qpsafe.recovery.returns import RecoveryRules
+from qpsafe.recovery.steps import FINITE, MET, PHASES, quiet_after
+from qpsafe.tasks.errors import TaskErrors, answers_alike
 from qpsafe.tasks.joint import JointTask
 from qpsafe.tasks.trajectory import FixedJoints
 
@@ -47,12 +49,7 @@ def _answer(question: int, of: _Of, time: float) -> bool:
     return not own.waits_for
 
 
-def _too_fast(of: tuple[RecoveryRules, NDArray[np.float64], bool, Sequence[int]]) -> bool:
-    return of[0].too_fast(*of[1:])
-
-
 _next_phase, _advance = steps.phases_by(_answer)
-_way_on = steps.ways_by(_too_fast)
 
 
 class Recovery:
@@ -76,10 +73,11 @@ class Recovery:
         self._dt, self._rules = dt, RecoveryRules() if rules is None else rules
         self._enter(steps.FOLLOWING)
         self._step = dt / self.rules.ramp  # of the clock's rate, from tick to tick
-        self._kept = math.exp(-dt / self.rules.fade)
         self.path_time, self.paused = 0.0, False
         #: Names of the tasks that the path waits for: not back yet, or not met when an event is due.
         self.waits_for: tuple[str, ...] = ()
+        #: The tasks' own references at this tick; None where they were not asked for.
+        self._samples: list[Any] | None = None
         self._rate, self._quiet = 1.0, 0.0  # of the clock; for how long danger has been small [s]
         self._changed = self._led = False
         self._way: Recovery | None = None
@@ -107,10 +105,11 @@ class Recovery:
         ]
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks, self.suspend_above, self._way = tuple(tasks), suspend_above, None
-        self._returns: list[Return | None] = [None] * len(self.tasks)
-        self._pending = [self.phase != FOLLOWING] * len(self.tasks)
-        self._offsets: list[NDArray[np.float64] | None] = [None] * len(self.tasks)  # of pending tasks, last tick
-        self._last: list[Any] = [None] * len(self.tasks)  # state and reference of suspended tasks, last tick
+        self._returns = Returns(self.tasks, self._rules, self._dt)
+        self._alike = all(map(answers_alike, self.tasks))
+        if self.phase != FOLLOWING:
+            self._returns.begin()
+        self._last: tuple[Any, Any] | None = None  # state and references of suspended tasks, last tick
         self._changed = True
 
     @property
@@ -126,7 +125,7 @@ class Recovery:
     @property
     def kept(self) -> float:
         """What is left of the speed of a held task, from tick to tick."""
-        return self._kept
+        return return_numbers(self._rules, self._dt)[KEPT]
 
     @property
     def way(self) -> Recovery | None:
@@ -137,18 +136,17 @@ class Recovery:
     def clocks(self) -> tuple:
         """Phase, times on the path and on the returns; set them back when the robot could not go along."""
         way = None if self._way is None else self._way.clocks
-        return self.path_time, self._rate, tuple(self._returns), tuple(self._pending), self._code, way, self._quiet
+        return self.path_time, self._rate, self._returns.clocks, self._code, way, self._quiet
 
     @clocks.setter
     def clocks(self, clocks: tuple) -> None:
-        self.path_time, self._rate = clocks[:2]
-        self._returns, self._pending = list(clocks[2]), list(clocks[3])
-        self._enter(clocks[4])
-        self._due, self._quiet = None, clocks[6]
-        if self._way is not None and clocks[5] is not None:
-            self._way.clocks = clocks[5]
+        self.path_time, self._rate, self._returns.clocks, code, way, self._quiet = clocks
+        self._enter(code)
+        self._due = None
+        if self._way is not None and way is not None:
+            self._way.clocks = way
 
-    def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> tuple[Any, ...]:
+    def update(self, cdf_n: float, state: RobotState, activations: tuple[float, ...]) -> Sequence[Any]:
         """Advance one tick and give each task its reference.
 
         Args:
@@ -162,7 +160,7 @@ class Recovery:
         Raises:
             ValueError: A trajectory is not finite; the phase stays as it was.
         """
-        self.waits_for = ()
+        self.waits_for, self._samples = (), None
         before, of, rules = self._code, (self, state, activations), self._rules
         danger = not cdf_n <= self.suspend_above and rules.enabled
         self._quiet = quiet_after(self._quiet, cdf_n, rules.calm * self.suspend_above, self._dt)
@@ -178,27 +176,41 @@ class Recovery:
             )  # fmt: skip
             if waits:
                 self.waits_for = self._not_met(state, (1.0,) * len(self.tasks))
-        if self.phase == FOLLOWING and self._rate == 1.0 and True not in self._pending:  # the usual case, in short
-            samples = [task.trajectory.sample(self.path_time) for task in self.tasks]
-            # the clock stands while an event waits for its tasks: a reference that moved on would keep them from it
-            return tuple([sample.slowed(0.0) for sample in samples] if self.waits_for else samples)
-        if self.phase == SUSPENDED and before == phase and (rules.held or not danger):
-            return tuple([self._reference(k, state, 0.0) for k in range(len(self.tasks))])
-        if self.phase == SUSPENDED:
-            held = [task.trajectory.sample(self.path_time).slowed(0.0) for task in self.tasks]
-            self._last = [(state, sample) for sample in held]  # only the last tick's will be of interest
+        if self.phase == SUSPENDED and not (before == phase and (rules.held or not danger)):
+            held = [sample.slowed(0.0) for sample in self._sampled()]
+            self._last = state, held  # only the last tick's will be of interest
             return tuple(held)
-        if self._way is not None:
+        if self._way is not None and self.phase != SUSPENDED:
             on_the_way = self._way.update(cdf_n, state, (min(activations),))
             if self._way.phase != FOLLOWING:
                 return on_the_way
             self._way = None  # there: what is left is the way from a posture that met the tasks
-        return tuple([self._reference(k, state, active) for k, active in enumerate(activations)])
+        samples, share = self._sampled(), self._rate if self.phase == FOLLOWING else 0.0
+        if self._returns.over:
+            if self.waits_for and share == 1.0:  # a reference that moved on would keep them from the event they wait at
+                share = 0.0
+            return tuple(samples if share == 1.0 else [sample.slowed(share) for sample in samples])
+        if self._last is not None:
+            self._returns.know(*self._last)
+            self._last = None
+        released = self.phase == SUSPENDED
+        return self._returns.references(samples, share, state, (0.0,) * len(samples) if released else activations)
 
     @property
     def on_path(self) -> bool:
         """Whether the references of this tick are the tasks' own trajectories, in place if not in speed."""
-        return True not in self._pending
+        return self._returns.over
+
+    def errors(self, state: RobotState, references: Sequence[Any]) -> TaskErrors:
+        """Of the tasks against their own trajectories.
+
+        Args:
+            state: Commanded configuration of this tick.
+            references: What `update` returned.
+        """
+        if type(references) is Led and not references.asked and self._alike:
+            return TaskErrors(self.tasks, state, references.wanted, {})
+        return TaskErrors.against(self._sampled() if self._samples is None else self._samples, self.tasks, state)
 
     def due_events(self) -> tuple[str, ...]:
         """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""
@@ -234,54 +246,23 @@ class Recovery:
         task = JointTask(FixedJoints(posture))
         self._led, self._way = True, Recovery([task], self.suspend_above, self.dt, self.rules)
         self._way.set_tasks([task], self.suspend_above, restart=False)
-        self._returns, self._offsets = [None] * len(self.tasks), [None] * len(self.tasks)
-        self._pending = [True] * len(self.tasks)
+        self._returns.begin(anew=True)
         return True
 
     def _suspend(self) -> None:
         self._rate = 0.0
         self._way, self._led = None, False
-        self._returns = [None] * len(self.tasks)
-        self._pending = [True] * len(self.tasks)
+        self._returns.begin()
 
-    def _reference(self, k: int, state: RobotState, active: float) -> Any:
-        task = self.tasks[k]
-        sample = task.trajectory.sample(self.path_time)
-        if self.phase != FOLLOWING or self._rate < 1.0:
-            sample = sample.slowed(0.0 if self.phase != FOLLOWING else self._rate)
-        if not self._pending[k]:
-            return sample
-        value = task.value(state)
-        if not sample.finite:  # never into an offset, which remembers
-            raise ValueError(f"the trajectory of the {task.name} task is not finite")
-        offset, before, joints = task.offset(value, sample), self._offset_before(k), value.ndim == 1
-        back, self._offsets[k] = self._returns[k], offset
-        rate = np.zeros_like(offset) if before is None else (offset - before) / self.dt
-        way = _way_on(back is not None, active >= 1.0, (self.rules, rate, joints, getattr(task, "rows", range(6))))
-        if way == HOLD:
-            self._returns[k] = None  # held, not pulled: its motion runs out
-            return sample.displaced(offset, self._kept * rate)
-        if back is None or way == SET_OUT:
-            back = Return(offset, rate, self.rules.duration(offset, joints))  # x_d,r is where the task is now
-        else:
-            back = back.later(self.dt)
-        self._returns[k] = back
-        if back.time >= back.duration:
-            self._returns[k], self._pending[k] = None, False
-            return sample
-        return back.displace(sample)
-
-    def _offset_before(self, k: int) -> NDArray[np.float64] | None:
-        """Offset of task k at the last tick, None if it was not finite or there was none."""
-        if self._last[k] is not None:
-            (state, sample), self._last[k] = self._last[k], None
-            task = self.tasks[k]
-            self._offsets[k] = task.offset(task.value(state), sample) if sample.finite else None
-        return self._offsets[k]
+    def _sampled(self) -> list[Any]:
+        """The tasks' own references at the time on the path."""
+        time = self.path_time
+        self._samples = [task.trajectory.sample(time) for task in self.tasks]
+        return self._samples
 
     def _not_back(self, activations: tuple[float, ...]) -> tuple[str, ...]:
         """Names of the fully active tasks that are still on their way back."""
-        tasks = zip(self.tasks, self._pending, activations, strict=True)
+        tasks = zip(self.tasks, self._returns.pending, activations, strict=True)
         return tuple([task.name for task, pending, active in tasks if pending and active >= 1.0])
 
     def _not_met(self, state: RobotState, activations: tuple[float, ...]) -> tuple[str, ...]:

@@ -1,18 +1,15 @@
-"""How a task comes back to its path: rules, and offsets from the reference that fade smoothly."""
+"""How a task comes back to its path: the rules, and the joint limits on the way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import JointLimits
-from qpsafe.recovery.steps import fading, length, minimum_jerk, return_time, run_out
 
 
 @dataclass(frozen=True)
@@ -70,55 +67,6 @@ class RecoveryRules:
     def paper(cls) -> RecoveryRules:
         """The way back begins as soon as danger falls below Δ(1-ε), section IV-C, at the pace of the first release."""
         return cls(speed=0.25, angular_speed=0.8, calm=1.0, dwell=0.0, held=False)
-
-    def duration(self, offset: NDArray[np.float64], joints: bool) -> float:
-        """Of the return from an offset (6,) or (n,) [s]; the peak speed of `minimum_jerk` is 15/8 of the mean."""
-        if joints:
-            mean = float(np.abs(offset).max()) / self.joint_speed
-        else:
-            mean = max(length(*offset[:3].tolist()) / self.speed, length(*offset[3:].tolist()) / self.angular_speed)
-        return return_time(mean, self.shortest)
-
-    def too_fast(self, rate: NDArray[np.float64], joints: bool, rows: Sequence[int]) -> bool:
-        """Whether a rate of an offset (6,) or (n,) is above the peak speed of a return.
-
-        Args:
-            rate: [m/s, rad/s] or [rad/s].
-            joints: Whether it is one of joint positions.
-            rows: Which of the six a task on a pose controls.
-        """
-        if joints:
-            return not float(np.abs(rate).max()) <= self.joint_speed
-        linear, angular = length(*rate[:3].tolist()), length(*rate[3:].tolist())
-        moves, turns = min(rows) < 3, max(rows) >= 3
-        return (moves and not linear <= self.speed) or (turns and not angular <= self.angular_speed)
-
-
-@dataclass(frozen=True, eq=False)
-class Return:
-    """The way back of one task: its offset from the reference, which fades by minimum jerk from the task's own speed.
-
-    Attributes:
-        offset: At the start (6,) or (n,).
-        speed: Rate of the offset at the start (6,) or (n,).
-        duration: [s].
-        time: Since the start [s].
-    """
-
-    offset: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    duration: float
-    time: float = 0.0
-
-    def later(self, dt: float) -> Return:
-        """The same return after a tick [s]."""
-        return Return(self.offset, self.speed, self.duration, self.time + dt)
-
-    def displace(self, sample: Any) -> Any:
-        """The reference with what is left of the offset."""
-        share = self.time / self.duration
-        a, b, c, d = fading(*minimum_jerk(share), *run_out(share), self.duration)
-        return sample.displaced(a * self.offset + b * self.speed, c * self.offset + d * self.speed)
 
 
 class GentleLimits:

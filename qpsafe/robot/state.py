@@ -46,12 +46,13 @@ class RobotState:
         memory: What `qpsafe.robot.kinematics.forward` computed, for compiled code.
     """
 
-    __slots__ = ("memory", "q", "robot")
+    __slots__ = ("_poses", "memory", "q", "robot")
 
     def __init__(self, robot: Jointed, q: Array) -> None:
         self.robot = robot
         self.q = q
         self.memory = np.empty(robot.memory)
+        self._poses: dict[str, Array] = {}  # asked for before
         forward(q, *robot.tree, self.memory)
 
     def __repr__(self) -> str:
@@ -64,9 +65,12 @@ class RobotState:
 
     def pose(self, frame: str) -> Array:
         """Pose of a frame in the world, (4, 4) [m]."""
-        robot, pose = self.robot, np.empty((4, 4))
-        pose_of(self.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), pose)
-        return pose
+        pose = self._poses.get(frame)
+        if pose is None:
+            robot, pose = self.robot, np.empty((4, 4))
+            pose_of(self.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), pose)
+            self._poses[frame] = pose
+        return pose.copy()
 
     def position(self, frame: str) -> Array:
         """Origin of a frame in the world, (3,) [m]."""

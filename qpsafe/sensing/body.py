@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -47,3 +48,22 @@ def fixed_to(robot: Robot, frame: str, thing: Obstacle) -> BodyHull:
     found = robot.model.frames[robot.frame_id(frame)]
     placement = found.placement.homogeneous
     return int(found.parentJoint), thing.name, thing.vertices @ placement[:3, :3].T + placement[:3, 3]
+
+
+def surrounding_hulls(
+    robot: Robot, own: bool, known: Sequence[Obstacle], carried: Mapping[str, Sequence[Obstacle]] | None
+) -> HullSet:
+    """What is no danger when it is seen: known obstacles, on body 0, the world; the robot; what its tools may carry.
+
+    Args:
+        robot: The robot.
+        own: Whether the robot itself belongs to it.
+        known: Known obstacles.
+        carried: What tools may carry, by frame.
+    """
+    hulls = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
+    if own:
+        hulls = hulls + body_hull_set(robot)
+    for frame, things in ({} if carried is None else carried).items():
+        hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
+    return hulls

@@ -97,6 +97,11 @@ class SpotHealth:
         return self.stopped or self._out > self._most
 
     @property
+    def any_out(self) -> bool:
+        """Whether any spot is unusable in this tick, or dead."""
+        return self._out > 0
+
+    @property
     def out_of_order(self) -> NDArray[np.intp]:
         """Indices of the spots whose sector nobody sees: unusable in this tick, or dead."""
         return (self.dead | (self.codes != HEALTHY)).nonzero()[0] if self._out else np.empty(0, dtype=np.intp)

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.sensing.body import body_hull_set, fixed_to
+from qpsafe.sensing.body import surrounding_hulls
 from qpsafe.sensing.detection import BadInput, as_floats
 from qpsafe.sensing.health import HEALTHY, WORDS, SpotHealth
 from qpsafe.sensing.hold import PointHold
-from qpsafe.sensing.hulls import HullSet, Obstacle
+from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.readings import take_readings
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.spots import SpotArray
@@ -126,12 +126,7 @@ class DistanceSensing(Fixed):
         check_surroundings(robot, rules, known, carried)
         spots.check(robot)
         self.spots = spots
-        # body 0 is the world: known obstacles stand in it
-        hulls = HullSet([(0, obstacle.name, obstacle.vertices) for obstacle in known])
-        if rules.self_detection:
-            hulls = hulls + body_hull_set(robot)
-        for frame, things in ({} if carried is None else carried).items():
-            hulls = hulls + HullSet([fixed_to(robot, frame, thing) for thing in things])
+        hulls = surrounding_hulls(robot, rules.self_detection, known, carried)
         count = len(spots)
         self.health = SpotHealth(count, rules, dt)
         self._hold = PointHold(count, rules, dt)
@@ -210,7 +205,7 @@ class DistanceSensing(Fixed):
     @property
     def unseen(self) -> tuple[str, ...]:
         """Names of the spots whose sector nobody sees: unusable in the last tick, or dead."""
-        return tuple([self.spots.names[i] for i in self.health.out_of_order])
+        return tuple([self.spots.names[i] for i in self.health.out_of_order]) if self.health.any_out else ()
 
     @property
     def counted(self) -> Array:

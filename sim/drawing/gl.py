@@ -92,3 +92,8 @@ def make_context(width: int, height: int) -> Any:
     context = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
     context.make_current()
     return context
+
+
+if __name__ == "__main__":  # for MUJOCO_GL, which MuJoCo's own renderer reads
+    works, word = gl_available()
+    print(word) if works else sys.exit(word)

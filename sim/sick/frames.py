@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 
-Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 #: Of the image that came and the first one since the fault began; None: nothing is passed on.
 Spoil = Callable[[RangeImage, RangeImage], RangeImage | None]
@@ -122,18 +122,19 @@ class SpoilsFrames:
         return passed
 
 
-def _rearranged(image: RangeImage, order: Callable[[Array], Array]) -> RangeImage:
+def _rearranged(image: RangeImage, order: Callable[[Numbers], Numbers]) -> RangeImage:
     """All parts of an image with its zones in another order."""
     numbers = np.arange(len(image.sensor)).reshape(image.sensor.shape)
     zones = order(numbers).ravel()
-    parts = {
-        key: None if value is None else np.asarray(value).ravel()[zones] if np.size(value) == len(zones) else value
-        for key, value in (("distances", image.distances), ("valid", image.valid), ("sigma", image.sigma))
-    }
-    return image._replace(**parts)
+
+    def moved(part: ArrayLike | None) -> ArrayLike | None:
+        return part if part is None or np.size(part) != len(zones) else np.asarray(part).ravel()[zones]
+
+    distances = np.asarray(image.distances).ravel()[zones]
+    return image._replace(distances=distances, valid=moved(image.valid), sigma=moved(image.sigma))
 
 
-def _zoomed(count: int) -> NDArray[np.int64]:
+def _zoomed(count: int) -> Numbers:
     """Which of the rows or columns stand where, the middle ones spread out."""
     middle = 0.5 * (count - 1)
     return np.rint(middle + (np.arange(count) - middle) / ZOOM).astype(np.int64)

@@ -89,7 +89,7 @@ def run_matrix(
     experiment: FixedExperiment,
     count: int = 20,
     seed: int = 0,
-    cases: Sequence[Case] | Sequence[FrameCase] | None = None,
+    cases: Sequence[Case | FrameCase] | None = None,
     jobs: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
@@ -143,7 +143,7 @@ def run_matrix(
 
 
 _WORK: list[
-    tuple[FixedLoop, Array, Sequence[Case] | Sequence[FrameCase], int]
+    tuple[FixedLoop, Array, Sequence[Case | FrameCase], int]
 ] = []  # inherited by forked processes, never pickled
 
 

@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
     nearest_healthy: float
 
 
-def at_moment(loop: FixedLoop, before: Array, cases: Sequence[Case] | Sequence[FrameCase], seed: int) -> list[Outcome]:
+def at_moment(loop: FixedLoop, before: Array, cases: Sequence[Case | FrameCase], seed: int) -> list[Outcome]:
     """All cases at one moment.
 
     Args:

@@ -25,7 +25,7 @@ import numpy as np
 from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import inline
 from qpsafe.hqp.own.damping import WITH, WITHOUT
-from qpsafe.hqp.own.level import minimise_level
+from qpsafe.hqp.own.level import minimise_compiled
 from qpsafe.hqp.own.linear import Array, Index, dot
 from qpsafe.hqp.own.state import ABSENT, LOCKED, State, cut, load_box, load_rows
 
@@ -93,7 +93,9 @@ def run(
             last = ends[level] if level < levels else rows + n
             if last > first and start < n:
                 near = damping[level] if level < levels else 0.0
-                start, turns = minimise_level(s, level, first, last, start, limit, mode, near)
+                start, turns = minimise_compiled(
+                    floats, integers, x, rows + 2 * n, m + n, level, first, last, start, limit, mode, near
+                )  # fmt: skip
                 info[1] += turns
                 if start < 0:
                     info[0], info[2] = TURNS, level

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.ranging.tracking.tracks_kernel import IMAGES, track
+from qpsafe.ranging.tracking.tracks_kernel import IMAGES, swept, track
 
 
 class PointTracks(Fixed):
@@ -95,8 +95,7 @@ class PointTracks(Fixed):
         if not replaces:
             self._slot, self._filled = (self._slot + 1) % IMAGES, min(self._filled + 1, IMAGES)
             self._kept = stamp
-        spread = np.broadcast_to(np.asarray(sigma, dtype=np.float64), (len(points),))
-        aside = np.broadcast_to(np.asarray(sweep, dtype=np.float64), (len(points),))
+        spread, aside = _each(sigma, len(points)), _each(sweep, len(points))
         self._stamp = stamp
         track(
             points, spread, aside, stamp, self.numbers, self._slot, self._filled - 1,
@@ -104,6 +103,13 @@ class PointTracks(Fixed):
             self._work, self._seen, self._vectors, self._stack, velocities,
         )  # fmt: skip
         return velocities
+
+
+def _each(value: ArrayLike, count: int) -> NDArray[np.float64]:
+    """One number for each point, or the caller's own array."""
+    if isinstance(value, np.ndarray) and value.shape == (count,):
+        return value
+    return np.full(count, value, dtype=np.float64)
 
 
 def sweep(
@@ -120,10 +126,6 @@ def sweep(
         now: Its pose now (4, 4) [m].
         dt: Time between [s], > 0.
     """
-    R, origin = now[:3, :3], now[:3, 3]
-    ray = points - origin
-    moved = points - (ray @ R @ before[:3, :3].T + before[:3, 3])  # the place on the same ray, then and now
-    length = np.linalg.norm(ray, axis=1, keepdims=True)
-    unit = np.divide(ray, length, out=np.zeros_like(ray), where=length > 0.0)
-    aside = moved - np.sum(moved * unit, axis=1, keepdims=True) * unit
-    return np.asarray((np.linalg.norm(aside, axis=1) + np.linalg.norm(origin - before[:3, 3])) / dt)
+    aside = np.empty(len(points))
+    swept(points, before, now, dt, aside)
+    return aside

@@ -27,7 +27,7 @@ def _others(points: Array, here: Array, number: Array, count: int, reach: float,
     for i in range(int(number[count - 1]) + 1, points.shape[0]):
         best, k = reach * reach, -1
         for j in range(count):
-            d = squared(points, i, here, j, 0.0, 0.0, 0.0)
+            d = squared(points[i, 0], points[i, 1], points[i, 2], here, j)
             if d < best:
                 best, k = d, j
         for c in range(3):
@@ -92,7 +92,7 @@ def track(
         if recent:
             parent = parent_of(
                 work[0], m, places[before], names[before, 0], motions[before], counts[before, 0], counts[before, 1],
-                dt, reach + fastest * dt, vectors[3], vectors[4],
+                dt, reach + fastest * dt, seen, vectors[3], vectors[4],
             )  # fmt: skip
         names[slot, 1, cluster] = parent
         for c in range(7):
@@ -123,8 +123,8 @@ def track(
         # at rest is what was there before, and also what has all of what was there before and more
         certain = 0.0
         if (
-            not is_there(work[0], m, seen, then, noise, reach, u, mean)
-            and not is_there(work[1], n, here, count, noise, reach, u, mean)
+            not is_there(work[0], m, seen, then, noise, reach, u)
+            and not is_there(work[1], n, here, count, noise, reach, u)
             and best_shift(work[0], m, work[1], n, guess[cluster], noise, reach, t, u, mean)
         ):
             certain = min(
@@ -149,3 +149,28 @@ def track(
                         velocities[int(number[i]), c] = left * motions[slot, cluster, c] / speed
     _others(points, here, number, count, reach, velocities)
     return clusters
+
+
+@entry(types.void(readable(2), readable(2), readable(2), _floats, _floats[::1]))
+def swept(points: Array, before: Array, now: Array, dt: float, aside: Array) -> None:
+    """Fill `aside` (p,), see `qpsafe.ranging.tracking.tracks.sweep`."""
+    parallax = 0.0
+    for c in range(3):
+        parallax += (now[c, 3] - before[c, 3]) ** 2
+    parallax = sqrt(parallax)
+    for i in range(points.shape[0]):
+        length, along, square = 0.0, 0.0, 0.0
+        for c in range(3):
+            length += (points[i, c] - now[c, 3]) ** 2
+        length = sqrt(length)
+        for c in range(3):
+            place = before[c, 3]  # on the same ray, then
+            for r in range(3):
+                own = 0.0
+                for k in range(3):
+                    own += now[k, r] * (points[i, k] - now[k, 3])
+                place += before[c, r] * own
+            moved = points[i, c] - place
+            square += moved * moved
+            along += moved * (points[i, c] - now[c, 3]) / length if length > 0.0 else 0.0
+        aside[i] = (sqrt(max(square - along * along, 0.0)) + parallax) / dt

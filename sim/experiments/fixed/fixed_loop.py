@@ -81,11 +81,11 @@ class FixedLoop:
             barrier=None if experiment.cap is None else DangerBarrier(experiment.cap),
             **parts,
         )
-        kinds, seed, spots = sensor_kinds(experiment.sensor), experiment.seed, self.controller.spots
-        self.sensor: Sensor | None = None if kinds.spots is None else make_sensor(kinds.spots, scene, spots, seed)
-        self.ranging = SceneRanging(scene, kinds.ranging, seed) if kinds.ranging else None
+        told, seed, spots = sensor_kinds(experiment.sensor), experiment.seed, self.controller.spots
+        self.sensor: Sensor | None = None if told.spots is None else make_sensor(told.spots, scene, spots, seed)
+        self.ranging = SceneRanging(scene, told.ranging, seed) if told.ranging else None
         #: What the controller is told of: spots, then range sensors; empty with perfect sight.
-        self.sensor_names = () if spots is None or kinds.spots == "perfect" else spots.names
+        self.sensor_names = () if spots is None or told.spots == "perfect" else spots.names
         self._spots = len(self.sensor_names)
         self.sensor_names += () if self.ranging is None else self.ranging.names
         self.poses: Callable[[int], Sequence[PersonPose]] = PosesAhead(self.walk.people, self.controller.dt)

@@ -183,7 +183,7 @@ def test_a_raise_at_any_kind_of_call_advances_once_and_loses_no_event(run: Any, 
     assert phases == {"following", "suspended", "recovering"}
     asked = {"PositionTask.clik", "OrientationTask.jacobian", "OrientationTask.velocity", "Swaying.event"}
     asked |= {"Reference.offset", "Reference.displaced", "HierarchicalLaw.solve", "DangerField.evaluate"}
-    asked |= {"Activation.at", "Evasion.step", "JointLimits.box", "DangerBarrier.scale", "RecoveryRules.too_fast"}
+    asked |= {"Activation.at", "Evasion.step", "JointLimits.box", "DangerBarrier.scale"}
     assert asked <= set(names)
     rng = np.random.default_rng(13)
     for place, name in enumerate(sorted(set(names))):

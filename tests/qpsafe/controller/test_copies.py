@@ -13,6 +13,7 @@ import pytest
 
 import qpsafe
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.tasks.errors import TaskErrors
 from qpsafe.tasks.joint import FixedJoints
 from qpsafe.tasks.moves import Arc, Dwell, JointMove, JointMoveOfFrame, Line
 
@@ -94,7 +95,9 @@ def test_ticks_are_equal_only_where_all_they_say_is(irb140: Any) -> None:
     assert len(tick.points) > 0
     assert replace(tick, solve_time=1.0) == tick
     assert tick != tick.reference
-    others = {"solve_time", "resolved"}
+    others = {"solve_time", "resolved", "off_path"}  # the last two tell `errors` and `box`
+    assert replace(tick, off_path=TaskErrors.of(tick.errors)) == tick
+    assert replace(tick, off_path=TaskErrors.of(tuple(error + 1e-9 for error in tick.errors))) != tick
     for part in fields(tick):
         if part.name not in others:
             value = getattr(tick, part.name)

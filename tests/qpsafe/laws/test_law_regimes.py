@@ -127,7 +127,7 @@ def test_one_call_is_the_parts_asked_one_by_one(irb140: Any, seed: int, spread: 
             state = irb140.at(np.where(np.arange(6) == 4, 0.7, state.q))  # pseudoinverses jump where a pose is singular
         resolve = Resolve(irb140, tasks, law, 0.004)
         for _ in range(2):  # nothing of one tick is left in the next
-            one = resolve(state, qd, np.zeros(6), samples, qd0, activations, limits)
+            one = resolve(state, qd, qd, samples, qd0, activations, limits)
         compare(irb140, one, one_by_one(state, qd, tasks, samples, qd0, activations, law, limits))
 
 
@@ -146,7 +146,7 @@ def test_built_in_parts_give_the_bits_of_the_law(
         samples[0].pose[0, 3] = np.nan
     if bad == 2:
         qd0[2] = np.inf
-    one = Resolve(irb140, tasks, law, 0.004)(state, qd, np.zeros(6), samples, qd0, activations, limits)
+    one = Resolve(irb140, tasks, law, 0.004)(state, qd, qd, samples, qd0, activations, limits)
     wanted = [task.clik(state, sample) for task, sample in zip(tasks, samples, strict=True)]
     wishes = tuple(TaskVelocity(clik.jacobian, clik.velocity) for clik in wanted)
     assert one.box is not None

@@ -51,7 +51,7 @@ def test_a_reaction_that_does_not_come_is_missed() -> None:
     wrong = [
         type(dead)("healthy, called dead", lambda image, first: image, NAMED, dead.within),
         type(dead)("dead, called kept", frames.silent, KEPT, healthy.within),
-        type(dead)("one dead, called stopped", frames.silent, STOPS, dead.within),
+        type(dead)("a quarter healthy, called stopped", lambda image, first: image, STOPS, dead.within, share=0.25),
     ]
     experiment = FixedExperiment(ROBOT, choreography=BRIEF, duration=5.0, sensor="vl53l5cx-ideal")
     for result in run_matrix(experiment, count=1, seed=4, cases=wrong, jobs=1):
