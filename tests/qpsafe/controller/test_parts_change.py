@@ -14,6 +14,7 @@ import pytest
 
 import qpsafe
 from qpsafe.laws.problem import LawProblem, LawResult
+from qpsafe.recovery.returning import Returns
 from qpsafe.sensing.sensing import DistanceSensing
 from qpsafe.tasks.frame import FrameTask, RelativeFrameTask
 from qpsafe.tasks.joint import JointTask, PostureTask
@@ -234,12 +235,21 @@ def made(**changes: Any) -> qpsafe.SafetyController:
     )
 
 
+def own(part: Any) -> Any:
+    """A copy of what remembers; tasks, rules and robots are shared."""
+    if isinstance(part, Returns):
+        copied = copy.copy(part)
+        copied.__dict__.update({key: own(x) for key, x in part.__dict__.items()})
+        return copied
+    return part.copy() if isinstance(part, list | np.ndarray) else part
+
+
 def transplant(old: Any, new: Any) -> None:
     """What a controller remembers, into one that was made otherwise."""
     for key in ("_seq", "_active", "_q", "_qd", "_qd_before"):
         setattr(new, key, getattr(old, key))
     above, returns = new.recovery.suspend_above, new._recovery
-    returns.__dict__.update({key: list(x) if isinstance(x, list) else x for key, x in old.recovery.__dict__.items()})
+    returns.__dict__.update({key: own(x) for key, x in old.recovery.__dict__.items()})
     returns.suspend_above = above
     new.evasion.velocity = old.evasion.velocity.copy()
     for mine, others in zip(new.sensing.memory, old.sensing.memory, strict=True):
