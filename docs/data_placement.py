@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 import qpsafe
-from qpsafe.placement.statistics import clopper_pearson
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.sensing.spots import SpotArray, detected_points, load_spots, rays_in_world
 from qpsafe.sim.campaign.closest import closest
@@ -93,15 +92,11 @@ def main() -> None:
     report: dict[str, Any] = {"robot": ROBOT, "trials": TRIALS, "seed": SEED, "instants": len(parts)}
     report |= {"hands": int(hands.sum()), "within": list(WITHIN)}
     for name, away in found.items():
-        report[name] = {}
-        for what, chosen in (("all", np.ones(len(away), dtype=bool)), ("hand", hands)):
-            counts = [int((away[chosen] <= within).sum()) for within in WITHIN]
-            low, high = clopper_pearson(counts, int(chosen.sum()))
-            report[name][what] = {
-                "share": [round(count / int(chosen.sum()), 4) for count in counts],
-                "low": low.round(4).tolist(),
-                "high": high.round(4).tolist(),
-            }
+        # no limits: instants of one encounter are not independent of each other
+        report[name] = {
+            what: [round(float((away[chosen] <= within).mean()), 4) for within in WITHIN]
+            for what, chosen in (("all", np.ones(len(away), dtype=bool)), ("hand", hands))
+        }
     FILE.write_text(json_text(report, indent=1) + "\n", encoding="utf-8")
     print(json_text(report), file=sys.stderr)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -131,6 +132,14 @@ def place() -> list[str]:
     ]
 
 
+def seen_by_arrays_of(robot: str) -> tuple[str, ...]:
+    """Whom they detect and of whom they see the nearest part, as the head of the robot's file says [%]."""
+    file = qpsafe.load_robot(robot).folder / "spots-vl53l5cx.toml"
+    told = re.search(r"They detect (\S+) % .* and of (\S+) % \(", file.read_text(encoding="utf-8").replace("\n# ", " "))
+    assert told is not None
+    return told.groups()
+
+
 def arrays(spots: dict[str, Any]) -> list[str]:
     found = measured("place-arrays")
     assert found["wanted"] == "nearest"
@@ -140,6 +149,11 @@ def arrays(spots: dict[str, Any]) -> list[str]:
         values = found["curves"][objective][what][1]
         return 1 + max(k for k, value in enumerate(values) if value < at_least)
 
+    met = measured("place-encounters")
+    near = {name: [f"{100 * share:.0f}" for share in met[name]["all"]] for name in ("spots", "vl53l5cx")}
+    hand = {name: f"{100 * met[name]['hand'][1]:.0f}" for name in near}
+    assert met["within"] == [0.1, 0.3]
+    one, two = (seen_by_arrays_of(name) for name in ("iiwa14", "irb14000"))
     waist = sum(name.startswith("waist") for name in found["placements"]["nearest"]["spots"])
     return [
         f"To detect 95 % takes {first('detection', 'probability', 0.95)} arrays, "
@@ -149,6 +163,13 @@ def arrays(spots: dict[str, Any]) -> list[str]:
         f"To see the nearest part of 95 % takes {first('nearest', 'nearest', 0.95)} arrays, "
         f"of 99 % takes {first('nearest', 'nearest', 0.99)}",
         f"are on the waist ({waist})",
+        f"20 arrays detect {one[0]} % around the iiwa 14 and see the nearest part of {one[1]} %; "
+        f"{two[0]} % and {two[1]} % on the two arms of the IRB 14000",
+        f"In {met['trials']} encounters",
+        f"at {met['instants']} instants with somebody nearer than 0.5 m",
+        f"by the 20 Sharps in {near['spots'][1]} %, by the 20 arrays in {near['vl53l5cx'][1]} %; "
+        f"within 0.1 m in {near['spots'][0]} and {near['vl53l5cx'][0]} %",
+        f"In {met['hands']} of them that part was a hand: {hand['spots']} and {hand['vl53l5cx']} % within 0.3 m",
     ]
 
 
