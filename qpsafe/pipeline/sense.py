@@ -35,6 +35,7 @@ from qpsafe.sensing.detection import (
 )
 from qpsafe.sensing.health import CLEAR
 from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.ranging.ranging import RangeSensing
@@ -198,7 +199,7 @@ class Sense:
         check_size(given)
         wire = self._robot.at(as_joint_position(q, self._robot)).wire(as_joint_velocity(qd, self._robot))
         kept = reduced(given, wire)
-        return kept, (f"{len(given)} points are reduced to the {len(kept)} nearest to the links",)
+        return kept, (f"{counted(len(given), 'point')} are reduced to those nearest to the links, {len(kept)}",)
 
     def _with(self, seen: Seen, more: Ranged) -> Seen:
         """The same with what images tell beside their points."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.ranging.nearest_kernel import reduce_points
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.sensing.detection import BadInput, refuse_points
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.wire import Wire
@@ -28,7 +29,7 @@ def check_size(points: Array) -> None:
     """
     if len(points) > TOO_MANY:
         expected = f"at most {TOO_MANY}; a RangeImage of a sensor with so many zones is reduced in time"
-        raise BadInput(f"{len(points)} points are given, expected {expected}")
+        raise BadInput(f"{counted(len(points), 'point')} are given, expected {expected}")
 
 
 def reduced(points: Array, wire: Wire) -> Array:

@@ -65,12 +65,13 @@ class RobotState:
 
     def pose(self, frame: str) -> Array:
         """Pose of a frame in the world, (4, 4) [m]."""
-        pose = self._poses.get(frame)
-        if pose is None:
+        try:
+            return self._poses[frame].copy()
+        except (KeyError, TypeError):  # not asked for before, or no name at all
             robot, pose = self.robot, np.empty((4, 4))
             pose_of(self.memory, robot.tree.supports, robot.ends, *robot.mounting(frame), pose)
             self._poses[frame] = pose
-        return pose.copy()
+            return pose.copy()
 
     def position(self, frame: str) -> Array:
         """Origin of a frame in the world, (3,) [m]."""

@@ -15,6 +15,7 @@ from qpsafe.ranging.extrinsics.register import SCHEDULE, Registration
 from qpsafe.ranging.extrinsics.start import first_poses, poses_around
 from qpsafe.ranging.extrinsics.surface import RobotSurface
 from qpsafe.ranging.extrinsics.views import View, Views
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.ranging.extrinsics.recording import Recording
@@ -86,7 +87,9 @@ def calibrate_camera(
     total, seen = sum(map(len, points)), sum(len(x) > 0 for x in points)
     if seen < 4 or total < 60:
         expected = "something that moves by more than 6 cm in at least 4 images, 60 points in all"
-        raise ConfigurationError("calibrate-camera", "recording", f"{total} points in {seen} images", expected)
+        raise ConfigurationError(
+            "calibrate-camera", "recording", f"{counted(total, 'point')} in {counted(seen, 'image')}", expected
+        )
     surface, views = RobotSurface(robot), Views(robot, recording.q, moving)
     surfaces = [surface.at(q) for q in recording.q]
     registration = Registration(points, surfaces)

@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import qpsafe
@@ -197,6 +197,7 @@ def test_a_robot_that_would_meet_itself():
 @given(st.integers(0, 19), st.floats(0.05, 0.25))
 def test_a_spot_that_sees_furniture_nearer_than_d_min_is_named(number, distance):
     """A plate across the axis of a spot: what it reads is known."""
+    assume(abs(distance - SensingRules().d_min) > 1e-9)  # there rounding decides
     spots = qpsafe.load_spots(ROBOT)
     origins, directions = spots.rays(ROBOT.at(ROBOT.home))
     pose = np.eye(4)
