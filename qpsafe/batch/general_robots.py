@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ class GeneralRobots:
         """One tick of all robots."""
         ticks = []
         for r, controller in enumerate(self._controllers):
-            seen: dict[str, NDArray[np.float64]] = {}
+            seen: dict[str, Any] = {}
             if given.how == code.DISTANCES:
                 seen = {"distances": given.distances[r], "ages": given.ages[r]}
             elif given.how == code.POINTS:

@@ -40,7 +40,7 @@ def arrays() -> Callable[[int], Any]:
     for k, distance in enumerate(sweep.tolist()):
         noisy = np.where(full.ravel(), distance + rng.normal(0.0, 0.01, (len(sensors), 64)), np.inf)
         images.append([(i, noisy[i]) for i in range(len(sensors)) if k % EVERY == i * EVERY // len(sensors)])
-    state = [np.array(robot.home), np.zeros(6), 0]
+    state: list[Any] = [np.array(robot.home), np.zeros(6), 0]
 
     def tick(k: int) -> None:
         now = state[2] * DT

@@ -176,7 +176,7 @@ class Sense:
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
         if ages is not None:  # old points would count as seen now
             raise BadInput("ages are given with points, which have none: leave out points that are too old")
-        given, notes = as_points(value), ()
+        given, notes = as_points(value), tuple[str, ...]()
         if len(given) > CLOUD:
             given, notes = self._reduced(q, qd, given)
         p = len(given) + len(more.points)

@@ -182,7 +182,7 @@ class RangeSensing:
         hidden = self._hidden(now, state, wire)
         if not total:
             return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
-        points, links, velocities = (array[:total] for array in self._placed)
+        points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
         points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
         count = choose(

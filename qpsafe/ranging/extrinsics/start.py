@@ -10,7 +10,7 @@ them, poses all around the robot are tried.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def first_poses(
     centre = there.mean(axis=0)
     axis = np.linalg.svd(there - centre)[2][0]
     turns = [(axis, turn / TURNS) for turn in range(TURNS)] + [(_UP, turn / UPRIGHT) for turn in range(1, UPRIGHT)]
-    tried = []
+    tried: list[Any] = []
     for k, (about, part) in enumerate(turns):
         step = np.concatenate((np.zeros(3), 2.0 * np.pi * part * about))
         found, _ = rough.refine(moved(pose, step, centre), _ROUGH)
@@ -96,7 +96,7 @@ def poses_around(
     rough = Registration(few, [(samples[::16], normals[::16]) for samples, normals in surfaces])
     seen = np.median(np.concatenate(points), axis=0)
     there = np.concatenate([samples for samples, _ in _moving_parts(surfaces)]).mean(axis=0)
-    tried = []
+    tried: list[Any] = []
     for rise in _RISES:
         for turn in range(_AROUND):
             around = 2.0 * np.pi * turn / _AROUND

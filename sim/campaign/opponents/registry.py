@@ -40,14 +40,19 @@ SPOTS, POINTS, NOTHING = "spots", "points", "nothing"  # what a controller is to
 class Controls(Protocol):
     """What a trial needs of a controller: `SafetyController.step`'s form."""
 
-    def step(self, q: NDArray, qd: NDArray, distances: ArrayLike | None = None, **told: Any) -> Tick:
+    def step(
+        self, q: NDArray, qd: NDArray, distances: ArrayLike | None = None, *, points: Any = None, images: Any = None,
+        now: Any = 0.0,
+    ) -> Tick:  # fmt: skip
         """One tick; never raises on data.
 
         Args:
             q: Measured (n,) [rad].
             qd: Measured (n,) [rad/s].
             distances: Of the spots (k,) [m].
-            told: Instead `points` (p, 3) [m], or `images` and the time `now` [s] where the campaign has range sensors.
+            points: Instead (p, 3) [m].
+            images: Of range sensors.
+            now: Present time on the clock of their stamps [s].
         """
         ...
 
