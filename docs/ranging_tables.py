@@ -47,4 +47,25 @@ def camera_calibration() -> str:
     return lines(("robot", "camera's place", "its direction", "a place at the robot", "called good"), rows)
 
 
-TABLES = {"place-arrays": place_arrays, "camera-calibration": camera_calibration}
+def images() -> str:
+    """The default controller by what it sees, on the same encounters."""
+    names = {"ideal": "20 ideal spots", "sharp": "20 Sharps", "vl53l5cx": "20 arrays"}
+    names |= {"sharp+depth": "20 Sharps and a depth camera", "vl53l5cx+depth": "20 arrays and the camera"}
+    rows = []
+    for sensor, found in measured("judged-images").items():
+        touched = share(found["contacts"] / found["trials"], *found["intervals"]["contacts"])
+        counts = [str(found[key]) for key in ("unseen", "moving", "towards", "over_limit", "furniture", "self")]
+        rows.append(
+            (
+                names[sensor],
+                f"{found['contacts']} of {found['trials']}: {touched}",
+                *counts,
+                f"{1e3 * found['distance_median']:.0f} mm",
+                f"{found['lost_time_mean']:.2f} s",
+            )
+        )
+    heads = ("sees by", "touched (95 %)", "unseen", "moving", "towards", "over limit", "furniture", "self")
+    return lines((*heads, "distance, median", "time lost"), rows)
+
+
+TABLES = {"images": images, "place-arrays": place_arrays, "camera-calibration": camera_calibration}

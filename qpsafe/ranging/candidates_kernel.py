@@ -28,10 +28,15 @@ _any, _two = readable(1), readable(2)
 _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
 
-@entry(types.int64(_outs, types.int64, _outs, types.int64, _two, types.float64, types.float64, types.float64))
+@entry(
+    types.int64(
+        _outs, types.int64, _outs, types.int64, _two, _two, types.float64, types.float64, types.float64
+    )
+)  # fmt: skip
 def renew(
-    store: Array, count: int, kept: Array, new: int, velocities: Array, stamp: float, hold: float, again: float
-) -> int:
+    store: Array, count: int, kept: Array, new: int, velocities: Array, found: Array, stamp: float, hold: float,
+    again: float,
+) -> int:  # fmt: skip
     """Put an image's points before those of earlier ones; returns how many there are now.
 
     Args:
@@ -40,16 +45,17 @@ def renew(
         kept: The image's (at least `new` rows, 4), see `reduce_zones`.
         new: How many.
         velocities: Theirs (new, 3) [m/s].
+        found: All points of the image that count, kept or not (p, 4).
         stamp: Of the image [s].
         hold: How long lost points still count [s].
-        again: An earlier point this near to a new one is the same thing [m].
+        again: An earlier point this near to one of these is the same thing, and not lost [m].
     """
     left = 0
     for i in range(count):  # those that are lost, to the front
         p, lost = (store[i, 0], store[i, 1], store[i, 2]), min(store[i, LOST], stamp)
         gone = stamp - lost > hold
-        for j in range(new):
-            w = add((kept[j, 0], kept[j, 1], kept[j, 2]), -1.0, p)
+        for j in range(found.shape[0]):
+            w = add((found[j, 0], found[j, 1], found[j, 2]), -1.0, p)
             gone = gone or dot(w, w) <= again * again
         if not gone:
             for c in range(WIDTH):

@@ -247,16 +247,16 @@ class RangeSensing:
             if self._tracks:
                 around = self._reducers[who].around(count, shown.seen, MOST)
                 velocities = self._tracks[who](given.stamp, around, None if fixed else pose)[:count]
-            self._renew(who, given.stamp, count, velocities)
+            self._renew(who, given.stamp, count, shown.seen, velocities)
             if self._together is not None:
                 self._together.take(who, given.stamp, pose, self._store, self._counts)
                 self._looked = True
         return wrong
 
-    def _renew(self, who: int, stamp: float, count: int, velocities: Array) -> None:
-        kept = self._reducers[who].kept
+    def _renew(self, who: int, stamp: float, count: int, seen: int, velocities: Array) -> None:
+        kept, found = self._reducers[who].kept, self._reducers[who].found[:seen]
         self._counts[who] = renew(
-            self._store[who], self._counts[who], kept, count, velocities, stamp, self.sensing.hold_time,
+            self._store[who], self._counts[who], kept, count, velocities, found, stamp, self.sensing.hold_time,
             2.0 * self.rules.apart,
         )  # fmt: skip
 

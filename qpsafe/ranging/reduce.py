@@ -87,6 +87,7 @@ class Reducer:
         zones: The sensor, or its tiles.
         size: Pixels along the edge of a tile.
         distances, valid, sigma: Of the zones of the last image (z,).
+        found: All points of the last image that count, as many as it was told to show (z, 4).
         kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
     """
 
@@ -101,7 +102,8 @@ class Reducer:
         ])  # fmt: skip
         self._tables, self._each, self._support = hulls.tables, rules.each, rules.support
         self._stride = farthest_zone(count)
-        self._work = np.empty((count, 4)), np.empty((links, count)), np.empty(count, dtype=np.int64)
+        self.found = np.empty((count, 4))
+        self._work = self.found, np.empty((links, count)), np.empty(count, dtype=np.int64)
         self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
         self.distances, self.valid, self.sigma = np.empty(count), np.zeros(count, dtype=np.bool_), np.empty(count)
         self.kept = np.empty((links * rules.each, 4))
@@ -116,7 +118,7 @@ class Reducer:
             most: p at most, or `count` if that is more.
         """
         every = -(-seen // max(most - count, 1)) if seen else 1
-        return np.concatenate((self.kept[:count, :3], self._work[0][:seen:every, :3]))
+        return np.concatenate((self.kept[:count, :3], self.found[:seen:every, :3]))
 
     def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire, carrier: int) -> tuple[int, Shown]:
         """Reduce an image: how many points `kept` holds now, and what the image shows.
