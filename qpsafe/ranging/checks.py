@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.sensor import RangeSensor
+from qpsafe.sensing.detection import BadInput
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -30,3 +32,16 @@ def checked_sensors(sensors: Any, robot: Robot) -> tuple[RangeSensor, ...]:
     if not found:
         raise ConfigurationError(where, "range_sensors", sensors, "at least one RangeSensor")
     return tuple(found.values())
+
+
+def check_clock(now: float, before: float) -> float:
+    """The present time [s], unless no image would ever be stale by it.
+
+    A clock that was set back is refused until it has caught up, or until the controller is reset.
+
+    Raises:
+        BadInput: It is not finite, or not later than that of the last tick.
+    """
+    if not before < now < inf:
+        raise BadInput(f"now = {now} s, expected a finite time later than that of the last tick, {before} s")
+    return now

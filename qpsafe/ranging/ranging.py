@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.field import DangerField
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
-from qpsafe.ranging.checks import checked_sensors
+from qpsafe.ranging.checks import check_clock, checked_sensors
 from qpsafe.ranging.configurations import Configurations
 from qpsafe.ranging.inbox import Inbox
 from qpsafe.ranging.judge import Judge
@@ -102,7 +103,7 @@ class RangeSensing:
         self._past = Configurations(robot.nq)
         self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
         self._inbox = Inbox(self.sensors, self.rules.budget)
-        self._now, self._seen = 0.0, np.zeros(count)
+        self._seen = np.zeros(count)
         self.reset()
 
     @property
@@ -145,6 +146,7 @@ class RangeSensing:
         self._inbox.reset()
         self.unseen: tuple[str, ...] = ()
         self.stopped = self._doubted = False
+        self._now = -inf
         self._begin = True  # sensors are waited for from the next tick on
 
     def acknowledge(self) -> None:
@@ -167,9 +169,9 @@ class RangeSensing:
             person: How fast people come [m/s].
 
         Raises:
-            BadInput: Too many sensors do not see.
+            BadInput: Too many sensors do not see; or the clock cannot tell how old anything is.
         """
-        self._now = now
+        self._now = check_clock(now, self._now)
         self._past.take(now, state.q)
         wire = state.wire(qd)
         notes = self._take_all(images, now, wire)
@@ -197,9 +199,8 @@ class RangeSensing:
             self._chosen,
         )
         chosen = self._chosen[:count]
-        near, leads = self._near[:total].copy(), self._leads[:total].copy()
-        if len(hidden):
-            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, np.zeros(len(hidden))))
+        near = np.concatenate((self._near[:total], hidden))
+        leads = np.concatenate((self._leads[:total], np.zeros(len(hidden))))
         return Ranged(points[chosen], links[chosen], velocities[chosen], near, leads, tuple(notes))
 
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:

@@ -100,6 +100,19 @@ def test_what_is_sick_is_told_and_its_sensor_is_dead_in_the_end(run: Any, array:
     assert not last.reference.qd.any()
 
 
+@pytest.mark.parametrize("now", [np.nan, np.inf, -np.inf, 0.4, 0.1])
+def test_a_clock_that_stands_or_tells_nothing_is_told(run: Any, array: RangeSensor, now: float) -> None:
+    """By it no image would ever be stale."""
+    rng, read = np.random.default_rng(5), table(array)
+    loop = run(spots="off", range_sensors=[array], known=[TABLE])
+    for k in range(101):
+        images = [array.image(noisy(read, rng), stamp=k * DT)] if k % 17 == 0 else []
+        assert loop.feed(loop.q, loop.qd, images=images, now=k * DT).status == "ok"
+    tick = loop.feed(loop.q, loop.qd, images=[], now=now)
+    assert tick.status == "bad_input"
+    assert "now = " in tick.messages[0]
+
+
 def test_silence_is_told(run: Any, array: RangeSensor) -> None:
     rng, read = np.random.default_rng(2), table(array)
     ticks = play(run, array, lambda k: [array.image(noisy(read, rng), stamp=k * DT)] if k == 0 else [], 120)
