@@ -134,19 +134,23 @@ def _serve(reading: Connection, shown: tuple[str, str | None, Path | None], host
 
 
 def show_all(inbound: Inbound, view: Any, page: Any) -> None:
-    """Show frames until no more arrive.
+    """Show frames until no more arrive; whoever opens the page later sees the newest one, however old it is.
 
     Args:
         inbound: Where frames arrive.
         view: What shows them.
         page: Whose.
     """
+    newest: Frame | None = None  # that has not been shown as a whole
     while not inbound.closed:
         frames = inbound.received(WAIT)
         for frame in frames:
             view.take(frame)
-        if frames and page.watched:
-            view.show(frames[-1])
+            newest = frame
+        if newest is not None and page.watched:
+            pause = not frames  # nothing hurries: all of it is shown, and once
+            view.show(newest, at_once=pause)
+            newest = None if pause else newest
 
 
 def scene_of(robot: str, experiment: str | None = None, cell: Path | None = None) -> Any:

@@ -213,16 +213,14 @@ def test_a_stream_is_shown_and_has_nothing_to_be_changed(tab: Open, program: Sta
     robot, sensors = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
     ports = ["--port", robot, "--sensor-port", sensors]
     words = ["--experiment", "fixed", "--events", "", "--web", "--web-port", free_port()]
-    serving = program("stream", *words, *ports)
-    simulated = Program(["irc5-sim", "--event-port", "0", *ports], tmp_path, serves=False)
+    # beside a browser, two processes that should be in time may not be: no watchdog may end the stream, and with it the
+    # page; a robot that has fallen silent is stopped, and the page shows that
+    serving = program("stream", "--watchdog", "0", *words, *ports)
+    simulated = Program(["irc5-sim", "--event-port", "0", "--duration", "1e4", *ports], tmp_path, serves=False)
     try:
         shown = tab(serving.address)
         at = shown.number("qp-time")
-        # where a machine has too much to do the stream's watchdog stops the robot, and the page shows that
-        ended = "stopped (stop category 1)"
-        shown.until(lambda: shown.number("qp-time") > at + 1.0 or ended in serving.said)
-        if ended in serving.said:
-            shown.until(lambda: shown.text("qp-state") == "stopped")
+        shown.until(lambda: shown.number("qp-time") > at + 1.0 or shown.text("qp-state") == "stopped")
         assert shown.number("qp-time") > 0.0
         assert shown.text("qp-distance") == "not known"
         assert len(shown.joints()) == 6

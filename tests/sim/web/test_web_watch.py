@@ -23,7 +23,7 @@ from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sim.web.bodies import Bodies
 from qpsafe.sim.web.frame import EVERY
-from qpsafe.sim.web.watch import Watch, scene_of
+from qpsafe.sim.web.watch import Watch, scene_of, show_all
 from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import build_scene
@@ -115,6 +115,32 @@ def test_a_page_that_is_killed_is_no_trouble() -> None:
     assert not watch.wait(1.0)
     assert run(watch) == run(None)
     watch.close()
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_whoever_looks_when_the_last_frame_has_come_sees_all_of_it(late: bool) -> None:
+    """A stopped stream may send nothing more: the page shows how it ended, also to who opens it afterwards."""
+    came, shown, asked = [[1, 2], [3], [], [], []], list[tuple[int, bool]](), list[bool]()
+
+    class Came:
+        @property
+        def closed(self) -> bool:
+            return not came
+
+        def received(self, patience: float) -> list[int]:
+            return came.pop(0)
+
+    class Page:
+        @property
+        def watched(self) -> bool:
+            asked.append(True)
+            return not late or len(asked) > 3
+
+    taken: list[int] = []
+    view = SimpleNamespace(take=taken.append, show=lambda frame, at_once: shown.append((frame, at_once)))
+    show_all(Came(), view, Page())  # type: ignore[arg-type]
+    assert taken == [1, 2, 3]
+    assert shown == ([(3, True)] if late else [(2, False), (3, False), (3, True)])
 
 
 class Drawing:
