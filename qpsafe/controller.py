@@ -204,10 +204,13 @@ class SafetyController(Running):
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self._activation.at(cdf_n)
         commanded = RobotState(self._robot, self._q)
+        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
+        gate = self.verifies
+        most = None if gate is None else gate.hold(self._q, self._qd, seen.people, old, seen.leads)
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
             capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
-            explained = seen.capped or not min(activations) >= 1.0 or capped
+            explained = seen.capped or not min(activations) >= 1.0 or capped or most is not None
             still = float(np.abs(qd0).max()) < CALM
             watched = self._tasks, self._law, recovery, commanded, self._qd
             stall.watch(self._seq, *watched, explained, still, near=lambda: self._near(commanded))
@@ -217,11 +220,10 @@ class SafetyController(Running):
             tasks, active, law = recovery.way.tasks, (min(activations),), _WAY_LAW
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
-        old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
         limits, soft = self._limits, (*self._kept_clear(commanded), *self._kept_apart(q, seen, old))
         if recovery.phase == RECOVERING and limits is not None and not soft:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
-        resolve = self._stages.resolve(tasks, law)
+        resolve = self._stages.resolve(tasks, law, most)
         given = (commanded, self._qd, self._qd_before, samples, qd0, active, limits, soft)
         if barrier is None:
             resolved = resolve(*given)
@@ -234,10 +236,10 @@ class SafetyController(Running):
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
-        gated, gate, doubts = PASSED, self.verifies, _SILENT
+        gated, doubts = PASSED, _SILENT
         if gate is not None:
             command, doubts = command.copy(), gate.notes()
-            gated = gate(self._q, self._qd, command, seen.people, old, seen.leads)
+            gated = gate(self._q, self._qd, command, seen.people, old, seen.leads, measured=True)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 #: Kinds of limits by their code; 0 stands for none.
-KINDS = ("", "position", "velocity", "acceleration", "jerk")
+KINDS = ("", "position", "velocity", "acceleration", "jerk", "stillness")
 
 
 class Box(NamedTuple):

@@ -169,7 +169,7 @@ def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[f
     if s.marks[code.PHASE] == RECOVERING and w.soft[1] == 0 and gentle(p, s, w):
         limits = p.gentle
     if s.marks[code.WAY] == 0:
-        gains, standing, _, _, weights, _, qd0 = _given(w.given, n, tasks)
+        gains, standing, _, _, weights, _, qd0, _ = _given(w.given, n, tasks)
         copy(p.gains, gains)
         weigh_compiled(s.activations, weights)
         copy(s.qd0, qd0)
@@ -194,7 +194,8 @@ def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[f
             )  # fmt: skip
         return excess, worst
     # back through the joints: one task on all of them, whose rows stand already
-    gains, standing, _, _, weights, _, qd0 = _given(w.way_given, n, 1)
+    gains, standing, _, _, weights, _, qd0, most = _given(w.way_given, n, 1)
+    copy(_given(w.given, n, tasks)[7], most)
     gains[0], standing[0] = p.numbers[code.WAY_GAIN], 1.0
     weights[0], weights[1] = 1.0 - least, least
     copy(s.qd0, qd0)

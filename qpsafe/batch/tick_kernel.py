@@ -16,7 +16,7 @@ to `FAULT`; everything else stands in the robot's blocks then, see `pack.own_of`
 
 from __future__ import annotations
 
-from math import nan
+from math import inf, nan
 from typing import Any
 
 from numba import types
@@ -31,9 +31,10 @@ from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.compiled.memory import view
 from qpsafe.danger.evasion import filter_by
-from qpsafe.gate import gate_kernel
+from qpsafe.gate import gate_kernel, stillness_kernel
 from qpsafe.gate.braking_path import slow_down
 from qpsafe.gate.gate_kernel import SHORT, WORTH_SAYING, let_through
+from qpsafe.gate.stillness_kernel import hold_still
 from qpsafe.pipeline.resolve_kernel import given
 from qpsafe.pipeline.sense_kernel import (
     ENDS as WIRE_ENDS,
@@ -47,8 +48,9 @@ from qpsafe.recovery.stall import HELD, SAID
 from qpsafe.robot.kinematics import Index, cut, frame_pose
 
 _filter_by, _given, _let_through = linked(filter_by), inline(given), linked(let_through, *gate_kernel.USES)
+_hold_still = linked(hold_still, *stillness_kernel.USES)
 #: All the code that goes into the kernel.
-USES = (stages_kernel, gate_kernel, *stages_kernel.USES, *gate_kernel.USES)
+USES = (stages_kernel, gate_kernel, stillness_kernel, *stages_kernel.USES, *gate_kernel.USES)
 
 
 @inline
@@ -65,9 +67,13 @@ def _plan(
     bodies = cut(w.memory, s.q.shape[0], i[WIRE_ENDS])[0]
     for k in range(p.gains.shape[0]):
         frame_pose(bodies[p.bodies[k]], p.placements[k], w.poses[k])
-    watch_stall(p, s, w, s.marks[code.CAPPED] == 1 or not least >= 1.0)
-    tasks = p.gains.shape[0]
-    _, _, goals, twists, _, _, _ = _given(w.given, s.q.shape[0], tasks)
+    _, _, goals, twists, _, _, _, most = _given(w.given, s.q.shape[0], p.gains.shape[0])
+    seen, leads, held = view(w.points, 0, (s.marks[code.COUNT], 3)), view(w.points, 0, (0,)), 0
+    for j in range(most.shape[0]):
+        most[j] = inf
+    if p.gate.shape[0] > 0:
+        held = _hold_still(p.gate, p.gate_whole, w.gate, w.gate_whole, s.q, s.qd, seen, ages, leads, most)
+    watch_stall(p, s, w, s.marks[code.CAPPED] == 1 or not least >= 1.0 or held > 0)
     update(p, s, w, s.result[code.CDF_N], least, goals, twists)
     for path in range(p.kinds.shape[0]):
         if p.kinds[path] == code.ENDS and s.clock[code.TIME] > p.periods[path]:
@@ -87,7 +93,7 @@ def _plan(
     if p.gate.shape[0] > 0:
         _let_through(
             p.gate, p.gate_whole, s.gate_known, w.gate, w.gate_whole, s.q, s.qd, w.command,
-            view(w.points, 0, (s.marks[code.COUNT], 3)), ages, view(w.points, 0, (0,)), s.gated,
+            seen, ages, leads, 1, s.gated,
         )  # fmt: skip
         if s.gated[SHORT] > WORTH_SAYING:
             notes |= code.TOO_NEAR

@@ -13,6 +13,7 @@ from qpsafe.gate.gate_kernel import CAUSE, PERSON_NEAR, POINT, SHARE, SHORT, TOL
 from qpsafe.gate.gated import NO_AGES, PASSED, Gated
 from qpsafe.gate.pack import bare_links, pack, robot_capsules, surroundings
 from qpsafe.gate.rules import VerifiedMotion
+from qpsafe.gate.stillness_kernel import hold_still
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,8 +54,9 @@ class Gate(Fixed):
         self._unsaid = True
 
     def __call__(
-        self, q: Array, qd: Array, command: Array, points: Array, ages: Array, leads: Array = NO_AGES
-    ) -> Gated:
+        self, q: Array, qd: Array, command: Array, points: Array, ages: Array, leads: Array = NO_AGES,
+        measured: bool = False,
+    ) -> Gated:  # fmt: skip
         """Replace a command (n,) [rad/s] by the part of it that can be let through.
 
         Args:
@@ -64,11 +66,31 @@ class Gate(Fixed):
             points: Where people were seen (p, 3) [m].
             ages: How old the readings are, of every spot (k,) [s]; none where they have none.
             leads: Of the last e points, which no spot saw: how long before now they were there, at least 0 (e,) [s].
+            measured: Whether `hold` was asked about the same just before.
         """
         if len(points) > self._room:
             self._make_room(len(points))
-        share = let_through(*self.blocks, self._known, *self._work, q, qd, command, points, ages, leads, self._told)
+        share = let_through(
+            *self.blocks, self._known, *self._work, q, qd, command, points, ages, leads, measured, self._told
+        )  # fmt: skip
         return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
+
+    def hold(self, q: Array, qd: Array, points: Array, ages: Array, leads: Array = NO_AGES) -> Array | None:
+        """Largest speeds of joints (n,) [rad/s] that must stand before a link is touched; infinite for the others.
+
+        Args:
+            q, qd: Commanded position and velocity (n,) [rad, rad/s].
+            points, ages, leads: As for a command.
+
+        Returns:
+            None if no joint is held.
+        """
+        if len(points) == 0:
+            return None
+        if len(points) > self._room:
+            self._make_room(len(points))
+        most = np.empty(len(q))
+        return most if hold_still(*self.blocks, *self._work, q, qd, points, ages, leads, most) else None
 
     def notes(self) -> tuple[str, ...]:
         """Doubts about the geometry that it measures with, in words; reported once."""

@@ -16,9 +16,9 @@ from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.compiled.memory import view
 from qpsafe.gate import braking_path, people_kernel, solids_kernel, tables, workspace
 from qpsafe.gate.braking_path import slow_down
-from qpsafe.gate.people_kernel import measure_all, people_excess, place_axes, stand
+from qpsafe.gate.people_kernel import look, people_excess
 from qpsafe.gate.solids_kernel import touched
-from qpsafe.gate.tables import CAPSULES, DT, GROUPS, MAX_AGE, PAIRS, SHAPES
+from qpsafe.gate.tables import CAPSULES, DT, GROUPS, PAIRS, SHAPES
 from qpsafe.geometry import pairs as pairs_module
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
@@ -51,25 +51,6 @@ def _passes(t, w, known, q, v, points, told):  # type: ignore[no-untyped-def]
     return True
 
 
-@inline
-def _oldest(ages, most):  # type: ignore[no-untyped-def]
-    """The largest age of a reading that counts; those of clocks that go wrong are 0."""
-    oldest = 0.0
-    for k in range(ages.shape[0]):
-        if oldest < ages[k] <= most:
-            oldest = ages[k]
-    return oldest
-
-
-@inline
-def _within(t, w, q, points):  # type: ignore[no-untyped-def]
-    """Measure all distances of axes and points at q; nothing to do where there are no points."""
-    if points.shape[0] > 0:
-        stand(t, q, w.none, w.nowhere, w.memory)
-        place_axes(t, w.memory, w.axes)
-        measure_all(w.axes, points, w.away)
-
-
 _block, _whole = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
 _out = types.float64[::1]
 
@@ -77,13 +58,13 @@ _out = types.float64[::1]
 @entry(
     types.float64(
         _block, _whole, _out, _out, types.int64[::1], _block, _block, _out,
-        types.Array(types.float64, 2, "C", readonly=True), readable(1), readable(1), _out,
+        types.Array(types.float64, 2, "C", readonly=True), readable(1), readable(1), types.int64, _out,
     ),
     *USES,
 )  # fmt: skip
 def let_through(
     floats: Array, integers: Index, own: Array, work: Array, whole: Index, q: Array, qd: Array, command: Array,
-    points: Array, ages: Array, leads: Array, told: Array,
+    points: Array, ages: Array, leads: Array, measured: int, told: Array,
 ) -> float:  # fmt: skip
     """Replace the command by the part of it that can be let through; returns the share λ.
 
@@ -96,6 +77,7 @@ def let_through(
         points: Seen (p, 3) [m].
         ages: Of the readings that told of the first points (k,) [s].
         leads: Of the last e points, how long before now they were where they are (e,) [s].
+        measured: Whether `hold_still` has looked at the same points from the same place, in the same memory.
         told: See above.
     """
     n, c, g = q.shape[0], integers[CAPSULES], integers[GROUPS]
@@ -103,10 +85,8 @@ def let_through(
     w = by_reference(workspace.workspace(work, whole, n, c, integers[SHAPES], integers[PAIRS], points.shape[0]))
     known = view(own, 0, (g, 1 + n))
     told[SHARE], told[CAUSE], told[WHO], told[POINT], told[SHORT] = 1.0, 0.0, -1.0, -1.0, 0.0
-    oldest, first = _oldest(ages, t.numbers[MAX_AGE]), points.shape[0] - leads.shape[0]
-    for k in range(points.shape[0]):
-        w.ages[k] = oldest if k < first else leads[k - first]
-    _within(t, w, q, points)
+    if measured == 0:
+        look(t, w, q, points, ages, leads)
     slow_down(qd, t.acceleration, t.numbers[DT], w.brake)
     low, high, share = 0.0, 1.0, 1.0
     cause, who, point = 0.0, -1.0, -1.0

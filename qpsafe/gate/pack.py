@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 FARTHEST = 0.4  # larger distances of solids are not measured [m]
+MOMENT = 0.1  # within which a link must be able to get away [s]
 MOST = 16  # cells that are kept a robot
 _surroundings: WeakKeyDictionary[Robot, OrderedDict[Any, Any]] = WeakKeyDictionary()
 _capsules: WeakKeyDictionary[Robot, Capsules] = WeakKeyDictionary()
@@ -149,11 +150,12 @@ def pack(
                       len(solids.neighbours), len(solids.planes)), dtype=np.int64)  # fmt: skip
     numbers = (
         limits.dt, rules.radius(0.0), rules.person_speed, rules.approach, rules.margin, FARTHEST, max_age,
-        rules.sidestep,
+        rules.sidestep, rules.escape,
     )  # fmt: skip
+    swift = np.minimum(limits.max_velocity, limits.max_acceleration * MOMENT)
     floats = (
-        numbers, limits.max_acceleration, tree.placements, tree.axes, tree.supports, capsules.ends, capsules.radii,
-        far, [group.lever for group in groups], solids.shapes, solids.vertices, solids.planes,
+        numbers, limits.max_acceleration, swift, tree.placements, tree.axes, tree.supports, capsules.ends,
+        capsules.radii, far, [group.lever for group in groups], solids.shapes, solids.vertices, solids.planes,
     )  # fmt: skip
     starts = np.cumsum([0, *(len(group.pairs) for group in groups)])
     whole = tree.parents, capsules.bodies, starts, pairs, solids.index, solids.starts, solids.neighbours

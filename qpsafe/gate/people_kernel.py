@@ -29,7 +29,7 @@ from typing import Any
 
 from qpsafe.compiled.compiled import Array, inline, linked
 from qpsafe.gate.braking_path import at_time, braked, covered, ticks_of
-from qpsafe.gate.tables import APPROACH, DT, NEAR, PERSON, SIDESTEP
+from qpsafe.gate.tables import APPROACH, DT, MAX_AGE, NEAR, PERSON, SIDESTEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 
@@ -73,6 +73,29 @@ def measure_all(axes: Array, points: Array, away: Array) -> None:
     for c in range(axes.shape[0]):
         for k in range(points.shape[0]):
             away[c * points.shape[0] + k], _ = to_axis(axes[c], points[k])
+
+
+@inline
+def _oldest(ages: Array, most: float) -> float:
+    """The largest age of a reading that counts; those of clocks that go wrong are 0."""
+    oldest = 0.0
+    for k in range(ages.shape[0]):
+        if oldest < ages[k] <= most:
+            oldest = ages[k]
+    return oldest
+
+
+@inline
+def look(t: Any, w: Any, q: Array, points: Array, ages: Array, leads: Array) -> None:
+    """Ages of all points, and their distances from all axes at q; nothing to do where there are no points."""
+    if points.shape[0] == 0:
+        return
+    oldest, first = _oldest(ages, t.numbers[MAX_AGE]), points.shape[0] - leads.shape[0]
+    for k in range(points.shape[0]):
+        w.ages[k] = oldest if k < first else leads[k - first]
+    stand(t, q, w.none, w.nowhere, w.memory)
+    place_axes(t, w.memory, w.axes)
+    measure_all(w.axes, points, w.away)
 
 
 @inline

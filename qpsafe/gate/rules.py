@@ -28,6 +28,9 @@ class VerifiedMotion(Fixed):
             nobody within `person_speed` times this of a seen point is approached. 0.05 s are 8 cm; ours. With
             infinity nobody is approached wherever they could have gone to by the time the robot stands: the strictest
             promise, which near people allows hardly any motion, going away included.
+        escape: A link that, from rest, could not get away from who is near at this speed within 0.1 s stands still
+            before it can be touched [m/s]: the turntable, the foot of the lower arm. 0: it goes on, and is touched
+            while it moves, sideways for the most part. On the IRB 140 the foot of the lower arm is such a link; ours.
         margin: Distance to furniture, floor and other links that is kept [m]. Between the instants looked at the
             distance stays above half of it. More than a reference interpolated over a tick leaves it by; ours.
 
@@ -39,10 +42,12 @@ class VerifiedMotion(Fixed):
     def __init__(
         self, person_speed: float = 1.6, *, latency: float = 0.02, servo_lag: float = 0.0, person_error: float = 0.02,
         approach: float = 0.05, margin: float = 0.004, sidestep: float = 0.05,
+        escape: float = 0.2,
     ) -> None:  # fmt: skip
         given = {
             "person_speed": person_speed, "latency": latency, "servo_lag": servo_lag, "person_error": person_error,
             "approach": approach, "margin": margin, "sidestep": sidestep,
+            "escape": escape,
         }  # fmt: skip
         for key, value in given.items():
             positive = key in ("approach", "margin")
@@ -63,6 +68,7 @@ class VerifiedMotion(Fixed):
     approach: float
     margin: float
     sidestep: float
+    escape: float
 
     def __repr__(self) -> str:
         rest = {key: getattr(self, key) for key in self.__annotations__ if key != "person_speed"}

@@ -13,9 +13,10 @@ from qpsafe.compiled.memory import view
 JOINTS, CAPSULES, GROUPS, PAIRS, SHAPES, VERTICES, EDGES, FACES = range(8)
 HEADER = 8
 #: `Tables.numbers`: tick; R(0) without age; person's speed; approach; margin; farthest distance that is
-#: measured; the oldest reading that counts; for how long people may step aside.
-DT, NEAR, PERSON, APPROACH, MARGIN, FARTHEST, MAX_AGE, SIDESTEP = range(8)
-NUMBERS = 8
+#: measured; the oldest reading that counts; for how long people may step aside; how fast a link
+#: must be able to get away, or else stand.
+DT, NEAR, PERSON, APPROACH, MARGIN, FARTHEST, MAX_AGE, SIDESTEP, ESCAPE = range(9)
+NUMBERS = 9
 
 
 class Tables(NamedTuple):
@@ -23,6 +24,7 @@ class Tables(NamedTuple):
 
     numbers: Any
     acceleration: Any  # (n,) [rad/s²]
+    swift: Any  # speeds that joints have a moment after rest (n,) [rad/s]
     placements: Any  # kinematics, see `Tree`: (n, 4, 4)
     axes: Any  # (n, 6)
     supports: Any  # (n + 1, n)
@@ -46,7 +48,7 @@ def shapes_of(sizes: Any) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int,
     """Shapes of the arrays of floats and of integers, in their order."""
     n, c, g, m, s, v, e, f = (int(size) for size in sizes[:HEADER])
     floats = (
-        (NUMBERS,), (n,), (n, 4, 4), (n, 6), (n + 1, n), (c, 2, 3), (c,), (c, n), (g, n), (s, 26), (v, 3), (f, 4),
+        (NUMBERS,), (n,), (n,), (n, 4, 4), (n, 6), (n + 1, n), (c, 2, 3), (c,), (c, n), (g, n), (s, 26), (v, 3), (f, 4),
     )  # fmt: skip
     return floats, ((n,), (c,), (g + 1,), (m, 2), (s, 10), (v + 1,), (e,))
 
@@ -62,7 +64,7 @@ def tables(floats: Any, integers: Any) -> Any:
     """Cut `Tables`."""
     n, c, g, m = integers[JOINTS], integers[CAPSULES], integers[GROUPS], integers[PAIRS]
     s, v, e, f = integers[SHAPES], integers[VERTICES], integers[EDGES], integers[FACES]
-    a = NUMBERS + n
+    a = NUMBERS + 2 * n
     b = a + 16 * n + 6 * n + (n + 1) * n
     d = b + 7 * c + c * n
     h = d + g * n
@@ -71,6 +73,7 @@ def tables(floats: Any, integers: Any) -> Any:
     return Tables(
         view(floats, 0, (NUMBERS,)),
         view(floats, NUMBERS, (n,)),
+        view(floats, NUMBERS + n, (n,)),
         view(floats, a, (n, 4, 4)),
         view(floats, a + 16 * n, (n, 6)),
         view(floats, a + 22 * n, (n + 1, n)),

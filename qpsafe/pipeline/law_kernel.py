@@ -68,7 +68,7 @@ def law_tick(
     """  # fmt: skip
     n, tasks = command.shape[0], ends.shape[0]
     A, b, e, x, bounds, blend, codes, info = cut_parts(floats, integers, n, ends[tasks - 1], tasks + 1)
-    gains, _, _, _, weights, near, qd0 = cut_given(block, n, tasks)
+    gains, _, _, _, weights, near, qd0, _ = cut_given(block, n, tasks)
     width = info.shape[1]
     for level in range(tasks + 1):
         near[level] = 0.0

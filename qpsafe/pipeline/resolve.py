@@ -108,10 +108,15 @@ class Resolve:
         tasks: Highest priority first.
         law: The law.
         dt: Tick [s].
+
+    Attributes:
+        most: Largest speeds of joints that are to stand in the next tick (n,) [rad/s], infinite for the others; None
+            for none.
     """
 
     def __init__(self, robot: Robot, tasks: Sequence[Task], law: Law, dt: float) -> None:
         self.parts = tasks, law
+        self.most: Array | None = None
         self._robot, self._dt = robot, dt
         #: Rows of each task that the compiled call fills in, None for the others.
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
@@ -123,9 +128,9 @@ class Resolve:
             from qpsafe.pipeline.law_kernel import law_tick  # not compiled for the strict law
 
             self._law_tick = law_tick
-        self._block = np.zeros(26 * len(tasks) + 2 + robot.nq)
+        self._block = np.zeros(26 * len(tasks) + 2 + 2 * robot.nq)
         cut = given(self._block, robot.nq, len(tasks))
-        self._gains, self._standing, self._goals, self._twists, self._weights, _, self._qd0 = cut
+        self._gains, self._standing, self._goals, self._twists, self._weights, _, self._qd0, self._most = cut
         self._gains[:] = [task.gain for task in tasks]
         nowhere = (0, np.eye(4))
         mountings = [
@@ -184,7 +189,7 @@ class Resolve:
                 cut.bounds[0], cut.bounds[1] = box.lower, box.upper
                 cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        self._qd0[:] = qd0
+        self._qd0[:], self._most[:] = qd0, np.inf if self.most is None else self.most
         if activations is not self._weighed[0] or type(activations) is not tuple:
             self._weighed = activations, weigh(activations, self._weights).tolist()
         weights = self._weighed[1]

@@ -22,7 +22,7 @@ from qpsafe.laws import damping as laws_damping
 from qpsafe.laws import yielding as laws_yielding
 from qpsafe.laws.damping import threshold_compiled
 from qpsafe.laws.yielding import yield_to
-from qpsafe.limits import admit_into, box_into
+from qpsafe.limits import KINDS, admit_into, box_into
 from qpsafe.pipeline.checks import ABSURD_STEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
@@ -95,7 +95,8 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
     """Cut from a block what changes every tick.
 
     These are gains (tasks,); which tasks' rows stand already, 1 or 0 (tasks,); goals (tasks, 4, 4); twists (tasks, 6);
-    weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in by the call; q̇0 (n,).
+    weights of the regimes (tasks + 1,); damping of the levels (tasks + 1,), filled in by the call; q̇0 (n,); the largest
+    speeds of joints that are to stand, infinite for the others (n,).
 
     Args:
         block: The floats.
@@ -110,10 +111,12 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
         view(block, 24 * tasks, (tasks + 1,)),
         view(block, 25 * tasks + 1, (tasks + 1,)),
         view(block, 26 * tasks + 2, (n,)),
+        view(block, 26 * tasks + 2 + n, (n,)),
     )
 
 
 cut_parts, cut_given = inline(parts), inline(given)
+STILLNESS = KINDS.index("stillness")
 #: All the code that goes into `resolve_tick`.
 USES = (kinematics, clik, limits_module, laws_damping, laws_yielding, regimes, *MODULES)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
@@ -122,6 +125,16 @@ _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.
 layout_types = (
     _out, _out_ints, types.int64, types.float64[:, ::1], types.float64[:, ::1], _out_ints, _ints, _out, _ints,
 )  # fmt: skip
+
+
+@inline
+def hold_into(most: Array, bounds: Array, codes: Index) -> None:
+    """Narrow the box to speeds of at most `most` (n,), as far as that leaves something."""
+    for i in range(most.shape[0]):
+        if most[i] < bounds[1, i]:
+            bounds[1, i], codes[1, i] = max(bounds[0, i], most[i]), STILLNESS
+        if -most[i] > bounds[0, i]:
+            bounds[0, i], codes[0, i] = min(bounds[1, i], -most[i]), STILLNESS
 
 
 @inline
@@ -174,7 +187,7 @@ def resolve_tick(
     """  # fmt: skip
     n, tasks = q.shape[0], bodies.shape[0]
     A, b, e, x, bounds, blend, codes, info = cut_parts(floats, integers, n, rows.shape[0], tasks + 1)
-    gains, standing, goals, twists, weights, near, qd0 = cut_given(block, n, tasks)
+    gains, standing, goals, twists, weights, near, qd0, most = cut_given(block, n, tasks)
     poses, axes, _, _ = cut(memory, n, k)
     square = damping * damping
     # CLIK: ẋ = ẋ_d + K e
@@ -194,6 +207,7 @@ def resolve_tick(
     near[tasks] = 0.0  # the level that closes the hierarchy has none
     if limits.shape[0] > 0:
         box_into(q, qd, limits[0], limits[1], limits[2], limits[3], dt, return_speed, bounds, codes)
+    hold_into(most, bounds, codes)
     if damping != damping:
         return 0.0, 0.0
     # regimes of the law within the box, blended

@@ -69,11 +69,18 @@ class Stages:
             made = self._sense = Sense(self._robot, sensing, field, evasion, ranging)
         return made
 
-    def resolve(self, tasks: Sequence[Task], law: Law) -> Resolve:
-        """From references and q̇0 to the command."""
+    def resolve(self, tasks: Sequence[Task], law: Law, most: Array | None = None) -> Resolve:
+        """From references and q̇0 to the command.
+
+        Args:
+            tasks: Highest priority first.
+            law: The law.
+            most: Largest speeds of joints that are to stand (n,) [rad/s], infinite for the others; None for none.
+        """
         made = self._resolve
         if made is None or not (made.parts[0] is tasks and made.parts[1] is law):
             made = self._resolve = Resolve(self._robot, tasks, law, self._dt)
+        made.most = most
         return made
 
     def gate(self, rules: VerifiedMotion, limits: JointLimits) -> Gate:

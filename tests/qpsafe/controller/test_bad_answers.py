@@ -9,6 +9,7 @@ import pytest
 
 import qpsafe
 from qpsafe.hqp.own import regimes
+from qpsafe.limits import KINDS
 from qpsafe.tasks.clik import Clik
 
 SPOILT: dict[str, Any] = {
@@ -85,7 +86,7 @@ BOXES: dict[str, Any] = {  # of the right one at a tick
     "empty": lambda box: box._replace(lower=box.upper, upper=box.lower),
     "faster": lambda box: box._replace(upper=box.upper + np.eye(6)[3] * 1e-6),
     "standstill": lambda box: box._replace(lower=np.zeros(6), upper=np.zeros(6)),
-    "codes": lambda box: box._replace(upper_kind=np.full(6, 5)),
+    "codes": lambda box: box._replace(upper_kind=np.full(6, len(KINDS))),
     "codes below": lambda box: box._replace(sacrificed=np.full(6, -1)),
     "text": lambda box: box._replace(lower=box.lower.astype(str)),
 }

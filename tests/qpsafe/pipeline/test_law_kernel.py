@@ -88,8 +88,8 @@ def stage(kind: int, p: LawProblem, explained: bool = True) -> Answer:
     layout = layout_for(n, counts, kind == WEIGHTED)
     for memory in (layout.floats, layout.matrix, layout.target):
         memory[:] = np.nan
-    block = np.full(26 * tasks + 2 + n, np.nan)
-    gains, _, _, _, weights, _, qd0 = given(block, n, tasks)
+    block = np.full(26 * tasks + 2 + 2 * n, np.nan)
+    gains, _, _, _, weights, _, qd0, _ = given(block, n, tasks)
     gains[:], weights[:], qd0[:] = 1.0, weights_of(p.activations), p.qd0
     floats, integers = map(np.zeros, sizes_of(n, rows, tasks + 1), (float, np.int64))
     cut = Parts(*parts(floats, integers, n, rows, tasks + 1))
