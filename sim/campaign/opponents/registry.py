@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
 from qpsafe.errors import ConfigurationError
+from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.nullspace import NullspaceLaw
@@ -104,6 +105,8 @@ _BUNDLED = (
     Opponent("velocities", "strict, with approach velocities in the field",
              _with(HierarchicalLaw(), **AS_IN_PAPER | {"sensing": SensingRules(velocities=True)})),
     Opponent("unverified", "default without gate and rows for furniture", _with(gate="off", clearance="off")),
+    Opponent("unheld", "default, but a link that cannot get away goes on",
+             _with(gate=VerifiedMotion(escape=0.0))),
     Opponent("separation", "rows for v_max under the joint limits, no evasion, the path waits", Separated),
     Opponent("strict_separation", "strict, with rows for v_max above all tasks", _apart),
     Opponent("default", "SafetyController as it comes", _with()),
