@@ -154,7 +154,8 @@ def judged() -> str:
         lines = filled(f"<!-- campaign: {measures} -->\n<!-- campaign: end -->", summary).splitlines()
         tables.append("\n".join(lines[2:-2]))
     paired = measured("judged-stop")["trials"]["finished"]
-    tables.insert(2, f"The difference to `stop`, ideal sensors, in the first {paired:,} of these, trial by trial:")
+    which = f"ideal sensors, in the first {paired:,} of these, trial by trial, before links stood:"
+    tables.insert(2, f"The difference to `stop`, {which}")
     return "\n\n".join(tables)
 
 

@@ -8,6 +8,15 @@ from typing import Any
 from demo_tables import lines
 from noted import measured
 
+#: What tells a controller where people are, in words.
+SEES = {
+    "ideal": "20 ideal spots",
+    "sharp": "20 Sharps",
+    "vl53l5cx": "20 arrays",
+    "sharp+depth": "20 Sharps and a depth camera",
+    "vl53l5cx+depth": "20 arrays and the camera",
+}
+
 
 def share(probability: float, low: float, high: float) -> str:
     """A share and its limits in per cent."""
@@ -49,15 +58,13 @@ def camera_calibration() -> str:
 
 def images() -> str:
     """The default controller by what it sees, on the same encounters."""
-    names = {"ideal": "20 ideal spots", "sharp": "20 Sharps", "vl53l5cx": "20 arrays"}
-    names |= {"sharp+depth": "20 Sharps and a depth camera", "vl53l5cx+depth": "20 arrays and the camera"}
     rows = []
     for sensor, found in measured("judged-images").items():
         touched = share(found["contacts"] / found["trials"], *found["intervals"]["contacts"])
         counts = [str(found[key]) for key in ("unseen", "moving", "towards", "over_limit", "furniture", "self")]
         rows.append(
             (
-                names[sensor],
+                SEES[sensor],
                 f"{found['contacts']} of {found['trials']}: {touched}",
                 *counts,
                 f"{1e3 * found['distance_median']:.0f} mm",
@@ -68,4 +75,29 @@ def images() -> str:
     return lines((*heads, "distance, median", "time lost"), rows)
 
 
-TABLES = {"images": images, "place-arrays": place_arrays, "camera-calibration": camera_calibration}
+def standing() -> str:
+    """The default controller beside the one whose links go on where they cannot get away, a sensor after the other."""
+    rows = []
+    for sensor, found in measured("judged-standing").items():
+        less = {row["measure"]: row for row in found["comparisons"]}
+        for name in ("unheld", "default"):
+            run = found["controllers"][name]
+            shares = [
+                f"{run[key]} of {run['trials']:,}: {share(run[key] / run['trials'], *run['intervals'][key])}"
+                for key in ("contacts", "moving", "towards")
+            ]
+            rows.append((SEES[sensor], f"`{name}`", *shares, f"{run['lost_time_mean']:.2f} s"))
+        more = [
+            f"{-less[key]['difference']:+.1%} (p = {less[key]['p']:.2g})".replace("%", " %")
+            for key in ("contacts", "moving", "towards")
+        ]
+        rows.append((SEES[sensor], "the difference", *more, f"{-less['lost_time_mean']['difference']:+.2f} s"))
+    return lines(("sees by", "", "touched (95 %)", "the robot moving", "towards", "time lost"), rows)
+
+
+TABLES = {
+    "standing": standing,
+    "images": images,
+    "place-arrays": place_arrays,
+    "camera-calibration": camera_calibration,
+}

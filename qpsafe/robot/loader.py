@@ -208,7 +208,7 @@ def _tuned(file: RobotFile, names: Sequence[str]) -> Tuned:
         mass, damping = (tuple([values[k] for k in order]) for values in (file.evasion.mass, file.evasion.damping))
         evasion = mass, damping
     rad, m = file.units.radians, file.units.metres
-    units = {"speed": m, "angular_speed": rad, "joint_speed": rad, "approach": m}
+    units = {"speed": m, "angular_speed": rad, "joint_speed": rad, "approach": m, "escape": m}
     tables = (file.recovery, file.sensing, file.gate)
     stated = ({} if table is None else table.model_dump(exclude_none=True) for table in tables)
     return Tuned(

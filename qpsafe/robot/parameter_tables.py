@@ -59,3 +59,4 @@ class GateTable(Table):
 
     approach: Positive | None = None
     sidestep: NotNegative | None = None
+    escape: NotNegative | None = None

@@ -95,7 +95,9 @@ def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
 
 
 @given(
-    key=st.sampled_from(("person_speed", "latency", "servo_lag", "person_error", "approach", "margin", "sidestep")),
+    key=st.sampled_from(
+        ("person_speed", "latency", "servo_lag", "person_error", "approach", "margin", "sidestep", "escape")
+    ),
     value=st.sampled_from((-1.0, math.nan, math.inf, "1", None, True)),
 )
 def test_figures_that_are_none_are_refused_by_name(key: str, value: object) -> None:

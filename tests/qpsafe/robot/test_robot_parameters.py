@@ -29,6 +29,7 @@ hold_time = 0.3
 
 [gate]
 approach = 0.02
+escape = 0.1
 """
 
 
@@ -62,7 +63,7 @@ def test_controllers_have_what_the_file_states_and_the_rest_by_default(folder: P
     assert made.sensing is not None
     assert made.sensing.rules.hold_time == 0.3
     assert made.gate is not None
-    assert (made.gate.approach, made.gate.sidestep) == (0.02, VerifiedMotion().sidestep)
+    assert (made.gate.approach, made.gate.sidestep, made.gate.escape) == (0.02, VerifiedMotion().sidestep, 0.1)
 
 
 def test_what_is_given_to_a_controller_counts_more(folder: Path) -> None:
