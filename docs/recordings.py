@@ -6,6 +6,8 @@ A file holds viser's page and about a megabyte of motion, so it is made and not 
 from __future__ import annotations
 
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,8 +64,14 @@ def recorded(experiment: Experiment) -> str:
         page.close()
 
 
+def write(name: str, folder: Path) -> None:
+    """Record one of the experiments into a file."""
+    (folder / f"{name}.html").write_text(recorded(experiments()[name]), encoding="utf-8")
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    for name, experiment in experiments().items():
-        (folder / f"{name}.html").write_text(recorded(experiment), encoding="utf-8")
+    with ProcessPoolExecutor() as processes:  # compiled by now
+        for _ in processes.map(partial(write, folder=folder), experiments()):
+            pass
