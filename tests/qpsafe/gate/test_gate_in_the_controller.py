@@ -155,7 +155,8 @@ def test_copies_and_pickles_go_on_alike() -> None:
 @given(seed=st.integers(0, 2**31))
 def test_no_number_gets_past_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    gate = Gate(ROBOT, VerifiedMotion(), JointLimits.of(ROBOT), [WALL])
+    rules = VerifiedMotion(person_speed=rng.choice([0.0, 1.6]), escape=rng.choice([0.2, 1e300]))
+    gate = Gate(ROBOT, rules, JointLimits.of(ROBOT), [WALL])
     points = rng.normal(size=(rng.integers(0, 40), 3)) * rng.choice([1e-6, 1.0, 1e6, 1e300])
     q = rng.uniform(ROBOT.lower, ROBOT.upper)
     qd = rng.uniform(-1, 1, 6) * ROBOT.max_velocity * rng.choice([0.0, 1.0])
@@ -168,3 +169,6 @@ def test_no_number_gets_past_it(seed: int) -> None:
     assert (command <= box.upper + 1e-12).all()
     assert 0.0 <= gated.share <= 1.0
     assert math.isfinite(gated.short)
+    most = gate.hold(q, qd, points, NO_AGES)
+    if most is not None:  # braking is always among what is allowed
+        assert (most >= np.maximum(np.abs(qd) - limits.max_acceleration * limits.dt, 0.0)).all()

@@ -148,3 +148,34 @@ def test_a_hand_at_the_turntable_finds_it_at_rest_and_the_tick_says_so() -> None
     assert speeds[0.0][touch] > 0.05
     assert said[0.0] == set()
     assert any(words.startswith("joint_1") for words in said[0.2])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_batch_holds_the_same_joints_bit_by_bit(seed: int) -> None:
+    robot, rng, held = qpsafe.load_robot("irb140"), np.random.default_rng(seed), 0
+
+    def made() -> qpsafe.SafetyController:
+        goal = robot.pose("tcp", robot.home)
+        goal[:3, 3] += rng.normal(0.0, 0.1, 3) if seed else 0.0
+        tasks = [
+            qpsafe.PositionTask("tcp", qpsafe.FixedPose(goal)),
+            qpsafe.OrientationTask("tcp", qpsafe.FixedPose(goal)),
+        ]
+        return qpsafe.SafetyController(robot, tasks)
+
+    state = rng.bit_generator.state
+    one = made()
+    rng.bit_generator.state = state  # the same goal
+    many = qpsafe.BatchController(made(), 1)
+    assert many.compiled
+    q, qd = robot.home, np.zeros(6)
+    start, way = rng.uniform((0.6, -0.4, 0.1), (0.9, 0.4, 0.5)), rng.uniform(0.5, 1.5)
+    for k in range(350):
+        hand = np.array((0.0, 0.0, 0.25)) + (start - (0.0, 0.0, 0.25)) * max(1.0 - way * 0.004 * k, 0.15)
+        seen = np.array([hand, start + np.array((0.0, 0.3, 0.3))])
+        tick, both = one.step(q, qd, points=seen), many.step([q], [qd], points=[seen])
+        np.testing.assert_array_equal(both.q[0], tick.reference.q)
+        np.testing.assert_array_equal(both.qd[0], tick.reference.qd)
+        held += any(words.endswith("stillness") for words in tick.binding)
+        q, qd = tick.reference.q, tick.reference.qd
+    assert held > 10
