@@ -90,7 +90,9 @@ def standing() -> str:
                 for key in STANDING
             ]
             rows.append((SEES[sensor], f"`{name}`", *shares, f"{run['lost_time_mean']:.2f} s"))
-        more = [f"{0.0 - less[key]['difference']:+.1%} (p = {less[key]['p']:.2g})".replace("%", " %") for key in STANDING]
+        more = [
+            f"{0.0 - less[key]['difference']:+.1%} (p = {less[key]['p']:.2g})".replace("%", " %") for key in STANDING
+        ]
         rows.append((SEES[sensor], "the difference", *more, f"{-less['lost_time_mean']['difference']:+.2f} s"))
     return lines(("sees by", "", "touched (95 %)", "the robot moving", "towards", "over limit", "time lost"), rows)
 
