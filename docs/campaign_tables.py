@@ -143,7 +143,8 @@ def gained() -> str:
 
 def judged() -> str:
     """The default controller on encounters that nothing was chosen by, a line a sensor; and beside the plain stop."""
-    found = {f"default, {name}": measured(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
+    defaults = {name: measured(f"judged-{name}")["controllers"]["default"] for name in ("ideal", "sharp")}
+    found = {f"default, {name}, {own['trials']:,} encounters": own for name, own in defaults.items()}
     alone = {"controllers": found, "references": []}
     tables = []
     for measures, summary in (
