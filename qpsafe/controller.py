@@ -206,7 +206,8 @@ class SafetyController(Running):
         commanded = RobotState(self._robot, self._q)
         old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
         gate = self.verifies
-        most = None if gate is None else gate.hold(self._q, self._qd, seen.people, old, seen.leads)
+        people, leads = seen.people, seen.leads
+        most = gate.hold(self._q, self._qd, people, old, leads) if gate is not None and len(people) else None
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
             capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
@@ -221,7 +222,7 @@ class SafetyController(Running):
 
         # tasks + q̇0 + activations + limits (+ barrier) -> law -> q̇, checked
         limits, soft = self._limits, (*self._kept_clear(commanded), *self._kept_apart(q, seen, old))
-        if recovery.phase == RECOVERING and limits is not None and not soft:
+        if recovery.phase == RECOVERING and limits is not None and not soft and most is None:
             limits = self._gentle.choose(limits, self._q, self._qd, self._acceleration)
         resolve = self._stages.resolve(tasks, law, most)
         given = (commanded, self._qd, self._qd_before, samples, qd0, active, limits, soft)
@@ -239,7 +240,7 @@ class SafetyController(Running):
         gated, doubts = PASSED, _SILENT
         if gate is not None:
             command, doubts = command.copy(), gate.notes()
-            gated = gate(self._q, self._qd, command, seen.people, old, seen.leads, measured=True)
+            gated = gate(self._q, self._qd, command, people, old, leads, len(people) > 0)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),

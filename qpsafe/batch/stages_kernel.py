@@ -160,13 +160,13 @@ def keep_clear(p: Any, s: Any, w: Any, memory: Array, limits: Array, dt: float) 
 
 
 @inline
-def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float) -> tuple[float, float]:
+def resolve(p: Any, s: Any, w: Any, f: Array, i: Index, least: float, held: int) -> tuple[float, float]:
     """The second half of a tick: from references and q̇0 to `command`, see `resolve_tick`."""
     n, tasks, k = s.q.shape[0], p.gains.shape[0], i[WIRE_ENDS]
     limits, dt, return_speed = p.limits, p.numbers[code.DT], p.numbers[code.RETURN_SPEED]
     supports, memory = view(f, i[SUPPORTS], (n + 1, n)), view(w.memory, 0, (w.memory.shape[0],))
     keep_clear(p, s, w, memory, limits, dt)
-    if s.marks[code.PHASE] == RECOVERING and w.soft[1] == 0 and gentle(p, s, w):
+    if s.marks[code.PHASE] == RECOVERING and w.soft[1] == 0 and held == 0 and gentle(p, s, w):
         limits = p.gentle
     if s.marks[code.WAY] == 0:
         gains, standing, _, _, weights, _, qd0, _ = _given(w.given, n, tasks)

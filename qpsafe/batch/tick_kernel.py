@@ -78,7 +78,7 @@ def _plan(
     for path in range(p.kinds.shape[0]):
         if p.kinds[path] == code.ENDS and s.clock[code.TIME] > p.periods[path]:
             return code.PATH_UNKNOWN
-    excess, worst = resolve(p, s, w, f, i, least)
+    excess, worst = resolve(p, s, w, f, i, least, held)
     if excess < 0.0:
         return code.LAW_ABSURD
     notes = 0

@@ -49,6 +49,7 @@ class Gate(Fixed):
         self._told = np.zeros(TOLD)
         self._work: tuple[Array, NDArray[np.int64]] = np.empty(0), np.empty(0, dtype=np.int64)
         self._room = -1
+        self._looked: list[Array] = []  # what the last call of `hold` measured
         self.blocks = pack(robot, (rules, limits, max_age), self.solids, self.groups)
         self._known = np.full(len(self.groups) * (1 + robot.nq), np.nan)  # nothing has been measured
         self._unsaid = True
@@ -66,8 +67,13 @@ class Gate(Fixed):
             points: Where people were seen (p, 3) [m].
             ages: How old the readings are, of every spot (k,) [s]; none where they have none.
             leads: Of the last e points, which no spot saw: how long before now they were there, at least 0 (e,) [s].
-            measured: Whether `hold` was asked about the same just before.
+            measured: Whether `hold` was asked about the same arrays just before; if it was not, they are measured.
         """
+        if measured:
+            known = self._looked
+            measured = len(known) > 0 and known[0] is q and known[1] is points
+            measured = measured and known[2] is ages and known[3] is leads
+        self._looked.clear()
         if len(points) > self._room:
             self._make_room(len(points))
         share = let_through(
@@ -89,6 +95,7 @@ class Gate(Fixed):
             return None
         if len(points) > self._room:
             self._make_room(len(points))
+        self._looked[:] = q, points, ages, leads
         most = np.empty(len(q))
         return most if hold_still(*self.blocks, *self._work, q, qd, points, ages, leads, most) else None
 

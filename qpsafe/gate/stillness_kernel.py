@@ -7,8 +7,10 @@ seen point, and w its speed of approach,
 
     τ = (d - R(0))/(v_h + w) - age,    |q̇_j| <= a_j τ,
 
-R(0) and v_h those of the gate. As d falls no faster than v_h + w, a_j τ falls no faster than joint j can brake. A link
-cannot get away if, starting from rest, it is after 0.1 s slower than the speed `escape`:
+R(0) and v_h those of the gate. As long as w does not rise, and the link could not get away before either, d falls no
+faster than v_h + w, and a_j τ no faster than joint j can brake. Where somebody is first seen near, or a link becomes
+such a one near somebody, joints brake as hard as they can: no bound is below |q̇_j| - a_j dt. A link cannot get away
+if, starting from rest, it is after 0.1 s slower than the speed `escape`:
 
     Σ_j |nᵀ J_j| min(v_j, a_j 0.1 s) < escape,    n from the seen point to the nearest point of the capsule's axis.
 

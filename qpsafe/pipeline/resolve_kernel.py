@@ -116,7 +116,7 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
 
 
 cut_parts, cut_given = inline(parts), inline(given)
-STILLNESS = KINDS.index("stillness")
+JERK, STILLNESS = KINDS.index("jerk"), KINDS.index("stillness")
 #: All the code that goes into `resolve_tick`.
 USES = (kinematics, clik, limits_module, laws_damping, laws_yielding, regimes, *MODULES)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
@@ -129,8 +129,12 @@ layout_types = (
 
 @inline
 def hold_into(most: Array, bounds: Array, codes: Index) -> None:
-    """Narrow the box to speeds of at most `most` (n,), as far as that leaves something."""
+    """Narrow the box to speeds of at most `most` (n,), as far as that leaves something; jerk limits give way."""
     for i in range(most.shape[0]):
+        if most[i] < bounds[0, i] and codes[0, i] == JERK:
+            bounds[0, i] = most[i]
+        if -most[i] > bounds[1, i] and codes[1, i] == JERK:
+            bounds[1, i] = -most[i]
         if most[i] < bounds[1, i]:
             bounds[1, i], codes[1, i] = max(bounds[0, i], most[i]), STILLNESS
         if -most[i] > bounds[0, i]:

@@ -179,3 +179,25 @@ def test_a_batch_holds_the_same_joints_bit_by_bit(seed: int) -> None:
         held += any(words.endswith("stillness") for words in tick.binding)
         q, qd = tick.reference.q, tick.reference.qd
     assert held > 10
+
+
+@pytest.mark.parametrize("max_jerk", [100.0, 1000.0])
+def test_jerk_limits_give_way(max_jerk: float) -> None:
+    robot, held = qpsafe.load_robot("irb140"), 0
+    here = qpsafe.FixedPose(robot.pose("tcp", robot.home))
+    own = JointLimits.of(robot, DT)
+    limits = JointLimits(
+        own.lower, own.upper, own.max_velocity, own.max_acceleration, DT, max_jerk=np.full(6, max_jerk)
+    )
+    controller = qpsafe.SafetyController(robot, [qpsafe.PositionTask("tcp", here)], limits=limits)
+    q, qd = robot.home, np.zeros(6)
+    for k in range(200):
+        hand = np.array((0.9 - 0.0064 * k, -0.1, 0.25))
+        assert controller.verifies is not None
+        most = controller.verifies.hold(q, qd, hand[None], FRESH)
+        tick = controller.step(q, qd, points=[hand])
+        if most is not None:
+            assert (np.abs(tick.reference.qd) <= most + 1e-9).all()
+            held += 1
+        q, qd = tick.reference.q, tick.reference.qd
+    assert held > 20
