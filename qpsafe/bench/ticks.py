@@ -33,27 +33,6 @@ ARRAYS, DENSE = "whole tick, 20 arrays of 64 zones at 15 Hz", "one depth image, 
 ROBOTS = 1000
 
 
-def rows() -> dict[str, Row]:
-    """All of it. The hierarchical law is strict where nothing else is said."""
-    return {
-        MAIN: Row(ticks(HierarchicalLaw())),
-        f"{MAIN}, garbage collector on": Row(ticks(HierarchicalLaw()), "on"),
-        f"{MAIN}, collector on after gc.freeze": Row(ticks(HierarchicalLaw()), "frozen"),
-        "whole tick, 20 points given": Row(ticks(HierarchicalLaw(), points=True)),
-        f"{MAIN}, a task of one's own": Row(ticks(HierarchicalLaw(), task=OwnTask)),
-        f"{MAIN}, paper's projection": Row(ticks(HierarchicalLaw("paper"))),
-        f"{MAIN}, weighted law": Row(ticks(WeightedLaw())),
-        f"{MAIN}, null-space law": Row(ticks(NullspaceLaw())),
-        "a robot of a batch of 1000, one core": Row(batch(1), share=ROBOTS),
-        "a robot of a batch of 1000, two cores": Row(batch(2), share=ROBOTS),
-        "a robot of a batch of 1000, nobody in sight, one core": Row(batch(1, np.inf), share=ROBOTS),
-        ARRAYS: Row(arrays()),
-        DENSE: Row(dense()),
-        "danger field, 20 points x 6 links": Row(danger_field()),
-        "sensing, 20 spots, all filters": Row(sensing()),
-    }
-
-
 class OwnTask(PositionTask):
     """A task of three rows of somebody's own making: asked method by method, in Python."""
 
@@ -149,3 +128,28 @@ def _offsets(controller: SafetyController) -> np.ndarray:
     """Of the spots' readings."""
     assert controller.spots is not None
     return np.random.default_rng(1).uniform(-0.02, 0.02, len(controller.spots))
+
+
+def rows() -> dict[str, Row]:
+    """All of `ROWS`, made."""
+    return {name: made() for name, made in ROWS.items()}
+
+
+#: What makes each row. The hierarchical law is strict where nothing else is said.
+ROWS: dict[str, Callable[[], Row]] = {
+    MAIN: lambda: Row(ticks(HierarchicalLaw())),
+    f"{MAIN}, garbage collector on": lambda: Row(ticks(HierarchicalLaw()), "on"),
+    f"{MAIN}, collector on after gc.freeze": lambda: Row(ticks(HierarchicalLaw()), "frozen"),
+    "whole tick, 20 points given": lambda: Row(ticks(HierarchicalLaw(), points=True)),
+    f"{MAIN}, a task of one's own": lambda: Row(ticks(HierarchicalLaw(), task=OwnTask)),
+    f"{MAIN}, paper's projection": lambda: Row(ticks(HierarchicalLaw("paper"))),
+    f"{MAIN}, weighted law": lambda: Row(ticks(WeightedLaw())),
+    f"{MAIN}, null-space law": lambda: Row(ticks(NullspaceLaw())),
+    "a robot of a batch of 1000, one core": lambda: Row(batch(1), share=ROBOTS),
+    "a robot of a batch of 1000, two cores": lambda: Row(batch(2), share=ROBOTS),
+    "a robot of a batch of 1000, nobody in sight, one core": lambda: Row(batch(1, np.inf), share=ROBOTS),
+    ARRAYS: lambda: Row(arrays()),
+    DENSE: lambda: Row(dense()),
+    "danger field, 20 points x 6 links": lambda: Row(danger_field()),
+    "sensing, 20 spots, all filters": lambda: Row(sensing()),
+}

@@ -6,6 +6,7 @@ Where the model has no collision geometry, they are those of the robot's wire, w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -59,7 +60,7 @@ def capsules_of(hulls: Sequence[tuple[int, str, Array]]) -> Capsules:
     for body, name, vertices in hulls:
         if body == 0:
             continue
-        for one in _around(np.asarray(vertices, dtype=float)):
+        for one in _around(np.asarray(vertices, dtype=float).tobytes()):
             bodies.append(body)
             names.append(name)
             found.append(one)
@@ -72,8 +73,13 @@ def capsules_of(hulls: Sequence[tuple[int, str, Array]]) -> Capsules:
     )
 
 
-def _around(points: Array) -> list[tuple[Array, float, float]]:
-    """Capsules (ends, radius, what it adds) around a hull: as few as add no more than `FAT`, at most `PIECES`."""
+@lru_cache(maxsize=512)
+def _around(vertices: bytes) -> list[tuple[Array, float, float]]:
+    """Capsules (ends, radius, what it adds) around a hull: as few as add no more than `FAT`, at most `PIECES`.
+
+    Made once: whoever loads a robot again has the same links.
+    """
+    points = np.frombuffer(vertices).reshape(-1, 3)
     best: list[tuple[Array, float, float]] = []
     for count in range(1, PIECES + 1):
         pieces = _cut(points, count)

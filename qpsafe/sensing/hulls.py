@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
@@ -94,21 +95,32 @@ def half_spaces(name: str, vertices: ArrayLike) -> Array:
     Raises:
         ConfigurationError: See `Obstacle`.
     """
-    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial import QhullError
 
     expected = "finite vertices (v, 3) that span a volume [m]"
     points = np.asarray(vertices, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
         raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
     try:
-        faces = ConvexHull(points).equations  # outward unit normals, offsets
+        return _planes(points.tobytes())
     except QhullError:
         raise ConfigurationError(f"obstacle {name}", "vertices", f"{len(points)} flat vertices", expected) from None
+
+
+@lru_cache(maxsize=512)
+def _planes(vertices: bytes) -> Array:
+    """Made once, read-only: whoever loads a robot again has the same links."""
+    from scipy.spatial import ConvexHull
+
+    points = np.frombuffer(vertices).reshape(-1, 3)
+    faces = ConvexHull(points).equations  # outward unit normals, offsets
     axes = np.vstack((np.eye(3), -np.eye(3)))
     sides = np.column_stack((axes, -np.concatenate((points.max(axis=0), -points.min(axis=0)))))
     planes = np.vstack((sides, faces))
     _, first = np.unique(planes.round(9), axis=0, return_index=True)  # triangles of one face have one plane
-    return planes[np.sort(first)]
+    found: Array = planes[np.sort(first)]
+    found.flags.writeable = False
+    return found
 
 
 class HullSet:

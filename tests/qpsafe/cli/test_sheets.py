@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -53,19 +53,12 @@ WIDTHS = (60, 80)
 Show = Callable[[Console, Path], None]
 
 
-@cache
-def bench_names() -> list[str]:
-    """Of all rows; it makes what they time."""
-    from qpsafe.bench.peers import MINK
-    from qpsafe.bench.ticks import rows
-
-    return [*rows(), MINK]
-
-
 def of_bench(screen: Console, folder: Path) -> None:
     from qpsafe.bench.clock import Times
+    from qpsafe.bench.peers import MINK
+    from qpsafe.bench.ticks import ROWS
 
-    names = bench_names()
+    names = [*ROWS, MINK]
     times = Times(20_000, 57.1e-6, 103.4e-6, 1234.5e-6, 123456.7e-6, 0.55, 0.53, 0.57)
     bench.show(dict.fromkeys(names, times), {"processor": f"{HOSTILE} CPU @ 2.20GHz", "python": "3.12.1"}, screen)
 
