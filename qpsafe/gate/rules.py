@@ -41,13 +41,11 @@ class VerifiedMotion(Fixed):
 
     def __init__(
         self, person_speed: float = 1.6, *, latency: float = 0.02, servo_lag: float = 0.0, person_error: float = 0.02,
-        approach: float = 0.05, margin: float = 0.004, sidestep: float = 0.05,
-        escape: float = 0.2,
+        approach: float = 0.05, margin: float = 0.004, sidestep: float = 0.05, escape: float = 0.2,
     ) -> None:  # fmt: skip
         given = {
             "person_speed": person_speed, "latency": latency, "servo_lag": servo_lag, "person_error": person_error,
-            "approach": approach, "margin": margin, "sidestep": sidestep,
-            "escape": escape,
+            "approach": approach, "margin": margin, "sidestep": sidestep, "escape": escape,
         }  # fmt: skip
         for key, value in given.items():
             positive = key in ("approach", "margin")

@@ -131,10 +131,14 @@ layout_types = (
 def hold_into(most: Array, bounds: Array, codes: Index) -> None:
     """Narrow the box to speeds of at most `most` (n,), as far as that leaves something; jerk limits give way."""
     for i in range(most.shape[0]):
-        if most[i] < bounds[0, i] and codes[0, i] == JERK:
+        above = most[i] < bounds[0, i] and codes[0, i] == JERK
+        below = -most[i] > bounds[1, i] and codes[1, i] == JERK
+        if above:
             bounds[0, i] = most[i]
-        if -most[i] > bounds[1, i] and codes[1, i] == JERK:
+        if below:
             bounds[1, i] = -most[i]
+        if (above or below) and codes[2, i] == 0:
+            codes[2, i] = JERK
         if most[i] < bounds[1, i]:
             bounds[1, i], codes[1, i] = max(bounds[0, i], most[i]), STILLNESS
         if -most[i] > bounds[0, i]:

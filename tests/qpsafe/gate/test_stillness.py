@@ -183,21 +183,53 @@ def test_a_batch_holds_the_same_joints_bit_by_bit(seed: int) -> None:
 
 @pytest.mark.parametrize("max_jerk", [100.0, 1000.0])
 def test_jerk_limits_give_way(max_jerk: float) -> None:
-    robot, held = qpsafe.load_robot("irb140"), 0
+    robot, held, told = qpsafe.load_robot("irb140"), 0, 0
     here = qpsafe.FixedPose(robot.pose("tcp", robot.home))
     own = JointLimits.of(robot, DT)
     limits = JointLimits(
         own.lower, own.upper, own.max_velocity, own.max_acceleration, DT, max_jerk=np.full(6, max_jerk)
     )
     controller = qpsafe.SafetyController(robot, [qpsafe.PositionTask("tcp", here)], limits=limits)
-    q, qd = robot.home, np.zeros(6)
+    q, qd, before = robot.home, np.zeros(6), np.zeros(6)
     for k in range(200):
         hand = np.array((0.9 - 0.0064 * k, -0.1, 0.25))
         assert controller.verifies is not None
         most = controller.verifies.hold(q, qd, hand[None], FRESH)
         tick = controller.step(q, qd, points=[hand])
+        new = tick.reference.qd
         if most is not None:
-            assert (np.abs(tick.reference.qd) <= most + 1e-9).all()
+            assert (np.abs(new) <= most + 1e-9).all()
             held += 1
-        q, qd = tick.reference.q, tick.reference.qd
+        if np.abs((new - 2.0 * qd + before) / DT**2).max() > max_jerk * (1.0 + 1e-6):
+            assert tick.box is not None
+            assert KINDS.index("jerk") in tick.box.sacrificed  # and it is told
+            assert any("jerk" in words for words in tick.messages)
+            told += 1
+        q, qd, before = tick.reference.q, new, qd
     assert held > 20
+    assert told > 0
+
+
+def test_gentle_limits_of_the_way_back_give_way(irb140: Robot) -> None:
+    """On its way back a robot accelerates by a share of what it can; joints that are to stand brake by all of it."""
+    here = irb140.pose("tcp", irb140.home)
+    held, harder, a = 0, 0, irb140.max_acceleration * DT
+    for seed in range(8):
+        rng, back = np.random.default_rng(seed), 0
+        controller = qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", qpsafe.FixedPose(here))])
+        q, qd, moment = irb140.home, np.zeros(6), int(rng.integers(10, 120))
+        for k in range(500):
+            if k == 200:  # whoever is within metres is there soon, and holds every joint
+                controller.gate = VerifiedMotion(person_speed=30.0, escape=100.0)
+            away = 0.6 - 0.002 * k if k < 200 else rng.uniform(1.5, 3.0) if moment <= back < moment + 5 else 20.0
+            hand = here[:3, 3] + away * np.array((0.8, 0.0, 0.6))
+            assert controller.verifies is not None
+            most = controller.verifies.hold(q, qd, hand[None], FRESH)
+            tick = controller.step(q, qd, points=[hand])
+            if most is not None and tick.phase == "recovering":
+                assert (np.abs(tick.reference.qd) <= most + 1e-9).all()
+                held += 1
+                harder += bool((np.abs(tick.reference.qd - qd) > 0.9 * a).any())
+            q, qd, back = tick.reference.q, tick.reference.qd, back + (tick.phase == "recovering")
+    assert held > 20
+    assert harder > 10  # than the way back is allowed to
