@@ -49,7 +49,7 @@ docs: $(VENV)/.docs ## the site, in build/docs/html; a warning is an error
 	@echo "docs: build/docs/html/index.html"
 
 # with the back end of OpenGL that works here, unless MUJOCO_GL names one
-figures: $(VENV)/.dev ## all figures of the docs again, from the code
+figures: $(VENV)/.browser ## all figures of the docs again, from the code
 	export MUJOCO_GL=$${MUJOCO_GL:-$$($(BIN)/python -m qpsafe.sim.drawing.gl)}; \
 	for script in docs/figures*.py robots/*/picture.py; do $(BIN)/python $$script || exit 1; done
 

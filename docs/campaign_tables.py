@@ -155,7 +155,7 @@ def judged() -> str:
         lines = filled(f"<!-- campaign: {measures} -->\n<!-- campaign: end -->", summary).splitlines()
         tables.append("\n".join(lines[2:-2]))
     paired = measured("judged-stop")["trials"]["finished"]
-    which = f"ideal sensors, in the first {paired:,} of these, trial by trial, before links stood:"
+    which = f"ideal sensors, in the first {paired:,} of these, trial by trial:"
     tables.insert(2, f"The difference to `stop`, {which}")
     return "\n\n".join(tables)
 

@@ -29,10 +29,13 @@ def patient(path: str, folder: Path) -> str:
 
 
 def quiet(shown: Tab) -> None:
-    """Close the notice that WebGL is software here."""
+    """Close the notice that WebGL is software here, unless it goes by itself first."""
+    from playwright.sync_api import TimeoutError
+
     notice = shown.page.locator(".mantine-Notification-closeButton")
     while notice.count():
-        notice.first.click()
+        with suppress(TimeoutError):
+            notice.first.click(timeout=10_000)
         shown.page.wait_for_timeout(300)
 
 
