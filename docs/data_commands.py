@@ -26,6 +26,7 @@ COMMANDS = {
     "robots": "demo fixed --robot all --json --no-video --out {out}",
     "path": "demo path --json --out {out}",
     "fast-person": "demo fast-person --json --out {out}",
+    "fast-person-sharp": "demo fast-person --sensor sharp --json --out {out}",
     "pick": "demo pick-and-place --seeds 10 --jobs 1 --json --out {out}",
     "compare": "compare --full --json",
     "place": "place --no-caps --json --no-pictures --out {out}",

@@ -40,7 +40,7 @@ def path() -> str:
 
 def fast_person() -> str:
     """Somebody walks straight at the robot, a line a run."""
-    heads = ("experiment", "walking [m/s]", "contact", "at [s]", "smallest distance [mm]")
+    heads = ("experiment", "walking [m/s]", "contact", "at [s]", "smallest distance [mm]", "of links that move [mm]")
     heads += ("robot's fastest point at that time [m/s]", "closing [m/s]", "contact with the robot moving [s]")
     rows = [
         (
@@ -49,6 +49,7 @@ def fast_person() -> str:
             "no" if run["contact"] is None else "yes",
             f"{run['time'] if run['contact'] is None else run['contact']:.2f}",
             f"{1e3 * run['distance']:.0f}",
+            f"{1e3 * run['moving_links']:.0f}",
             f"{run['robot_speed']:.2f}",
             f"{run['closing_speed']:.2f}",
             f"{run['moving_contact']:.2f}",

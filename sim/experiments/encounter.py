@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from qpsafe.sim.engine.bodies import Bodies
+from qpsafe.sim.engine.tracks import people_of
+from qpsafe.sim.engine.world import World
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 from qpsafe.sim.people.ahead import PosesAhead
 from qpsafe.sim.recording.log import RunLog
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from qpsafe.sim.replay.settings import Experiment
 
 MOVING = 1e-3  # below this the robot counts as standing [m/s]
+NEAR = 2.0  # farther away distances of links are not measured [m]
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,28 @@ def encounter(log: RunLog, experiment: Experiment) -> Encounter:
     )
 
 
+def to_moving_links(log: RunLog, experiment: Experiment) -> float:
+    """Smallest true distance of the links that move, the base left out: it can get away from nobody [m].
+
+    Args:
+        log: The run.
+        experiment: Of which it is.
+    """
+    scene, robot = experiment.scene, experiment.robot
+    bodies, poses, least = Bodies(World.of(scene), robot), _ahead(log, experiment), np.inf
+    data = scene.make_data(log.q[0])
+    for k in range(len(log.time)):
+        scene.place_people(data, poses(k))
+        near = bodies.to_people(robot.at(log.q[k]), people_of(scene, data), NEAR)
+        least = min(least, float(near.distance.min(initial=np.inf)))
+    return least
+
+
+def _ahead(log: RunLog, experiment: Experiment) -> PosesAhead:
+    people = experiment.people if isinstance(experiment, PickPlaceExperiment) else experiment.walk.people
+    return PosesAhead(people, log.dt)
+
+
 def _towards(log: RunLog, experiment: Experiment, k: int) -> float:
     """Speed of the robot's nearest point towards whom it is nearest to, at a tick [m/s].
 
@@ -98,8 +124,7 @@ def _towards(log: RunLog, experiment: Experiment, k: int) -> float:
     """
     scene = experiment.scene
     data = scene.make_data(log.q[k])
-    people = experiment.people if isinstance(experiment, PickPlaceExperiment) else experiment.walk.people
-    scene.place_people(data, PosesAhead(people, log.dt)(k))
+    scene.place_people(data, _ahead(log, experiment)(k))
     near = min(TrueDistances(scene).measure(data), key=lambda found: found.distance)
     state, pair = experiment.robot.at(log.q[k]), (near.on_robot, near.on_other)
     return contact_point(state, log.qd[k], near.body, pair, near.distance).towards

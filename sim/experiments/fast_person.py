@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.sim.drawing.plots import STYLE
-from qpsafe.sim.experiments.encounter import Encounter, encounter
+from qpsafe.sim.experiments.encounter import Encounter, encounter, to_moving_links
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.stage import robot_stage
 from qpsafe.sim.experiments.path.experiment import PathExperiment
@@ -28,23 +28,34 @@ if TYPE_CHECKING:
 
 #: The bundled story: 2.0 m/s up to the pedestal's foot.
 STORY = Path(__file__).with_name("fast-person.toml")
-SPEEDS = (0.5, 1.0, 1.6, 2.0)
+SPEEDS = (0.5, 1.0, 1.6, 2.0, 2.5)
 EXPERIMENTS = ("fixed", "path", "pick-and-place")
 
 
 @dataclass(frozen=True)
 class FastRun:
-    """One run: which experiment, how fast somebody walked [m/s], how it ended."""
+    """One run.
+
+    Attributes:
+        experiment: Which.
+        speed: How fast somebody walked [m/s].
+        encounter: How it ended.
+        moving_links: Smallest true distance of the links that move [m]; the base is bolted down.
+        built: The experiment.
+        log: Of the run.
+    """
 
     experiment: str
     speed: float
     encounter: Encounter
+    moving_links: float
     built: Experiment
     log: RunLog
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {"experiment": self.experiment, "speed": self.speed, **self.encounter.to_dict()}
+        known = {"experiment": self.experiment, "speed": self.speed, "moving_links": self.moving_links}
+        return known | self.encounter.to_dict()
 
 
 def at_speed(speed: float, floor: float = -0.55) -> Story:
@@ -64,6 +75,7 @@ def runs(
     speeds: tuple[float, ...] = SPEEDS,
     names: tuple[str, ...] = EXPERIMENTS,
     lag: float = 0.0,
+    sensor: str = "ideal",
     observer: Callable[[str, float, Experiment], Any] | None = None,
 ) -> Iterator[FastRun]:
     """Run every experiment at every speed.
@@ -74,14 +86,15 @@ def runs(
         speeds: Of the person [m/s].
         names: Of the experiments, some of `EXPERIMENTS`.
         lag: Of the plant [s].
+        sensor: `ideal` or `sharp`.
         observer: Called before every run with its name, speed and experiment; returns a context manager that gives the
             run's observer.
     """
     for name in names:
         for speed in speeds:
-            built = experiment_with(name, at_speed(speed, -pedestal_of(name, robot)), robot, law, lag)
+            built = experiment_with(name, at_speed(speed, -pedestal_of(name, robot)), robot, law, lag, sensor)
             log = _run(built, None if observer is None else observer(name, speed, built))
-            yield FastRun(name, speed, encounter(log, built), built, log)
+            yield FastRun(name, speed, encounter(log, built), to_moving_links(log, built), built, log)
 
 
 def pedestal_of(name: str, robot: Robot) -> float:
@@ -89,7 +102,9 @@ def pedestal_of(name: str, robot: Robot) -> float:
     return robot_stage(robot).pedestal if name != "pick-and-place" else work_for(robot).pedestal
 
 
-def experiment_with(name: str, story: Story, robot: Robot, law: Law | None = None, lag: float = 0.0) -> Experiment:
+def experiment_with(
+    name: str, story: Story, robot: Robot, law: Law | None = None, lag: float = 0.0, sensor: str = "ideal"
+) -> Experiment:
     """An experiment of `EXPERIMENTS` with a story's people; in the third one they carry no screws.
 
     Args:
@@ -98,17 +113,18 @@ def experiment_with(name: str, story: Story, robot: Robot, law: Law | None = Non
         robot: The robot.
         law: The control law; the experiment's own by default.
         lag: Of the plant's joints [s].
+        sensor: `ideal` or `sharp`.
     """
     if name == "pick-and-place":
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / STORY.name
             path.write_text(story.text, encoding="utf-8")
             some = {"cycles": 1 + round(story.duration / 5.0), "limit": story.duration, "brought": (0,), "lag": lag}
-            third = PickPlaceExperiment(robot, law, people_file=path, **some)  # type: ignore[arg-type]
+            third = PickPlaceExperiment(robot, law, people_file=path, sensor=sensor, **some)  # type: ignore[arg-type]
             third.story  # noqa: B018  read it while it is there
         return third
     kind = PathExperiment if name == "path" else FixedExperiment
-    return kind(robot, law, lag=lag, story=story, duration=story.duration)
+    return kind(robot, law, lag=lag, story=story, duration=story.duration, sensor=sensor)
 
 
 def _run(experiment: Experiment, watched: Any) -> RunLog:

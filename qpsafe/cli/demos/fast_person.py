@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,10 +32,17 @@ if TYPE_CHECKING:
     from qpsafe.sim.experiments.fast_person import FastRun
 
 
+class SpotSensor(StrEnum):
+    """Ideal distances, or simulated Sharp sensors."""
+
+    ideal = "ideal"
+    sharp = "sharp"
+
+
 def fast_person(
     robot: RobotName = "irb140",
     speed: Annotated[
-        list[float] | None, typer.Option(min=0.5, max=2.0, help="Walking speed [m/s]; may be repeated.")
+        list[float] | None, typer.Option(min=0.5, max=2.5, help="Walking speed [m/s]; may be repeated.")
     ] = None,
     experiment: Annotated[list[str] | None, typer.Option(help="Experiment to run; may be repeated.")] = None,
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
@@ -42,6 +50,7 @@ def fast_person(
         ProjectionName, typer.Option(help="Projection of the hierarchical law.")
     ] = ProjectionName.strict,
     lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s].")] = 0.0,
+    sensor: Annotated[SpotSensor, typer.Option(help="What its spots are.")] = SpotSensor.ideal,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
         "out/demo-fast-person"
     ),
@@ -87,7 +96,7 @@ def fast_person(
             with observed(built, file, video, view, screen, progress, label, states) as (observe, _):
                 yield observe
 
-        for run in runs(machine, make_law(law, projection), tuple(speed or SPEEDS), names, lag, watched):
+        for run in runs(machine, make_law(law, projection), tuple(speed or SPEEDS), names, lag, sensor.value, watched):
             found.append(run)
             file = out / f"run-{run.experiment}-{run.speed:g}.npz"
             write_run(file, run.log, settings_of(run.built), machine, states)
@@ -112,6 +121,7 @@ def show(found: list[FastRun], screen: Console) -> None:
         "contact",
         "at [s]",
         "smallest distance [mm]",
+        "of moving links [mm]",
         *speeds,
         "moving in contact [s]",
         "CDF_n",
@@ -125,6 +135,7 @@ def show(found: list[FastRun], screen: Console) -> None:
             verdict(e.contact is None, "no", "yes"),
             f"{e.time if e.contact is None else e.contact:.2f}",
             f"{1e3 * e.distance:.0f}",
+            f"{1e3 * run.moving_links:.0f}",
             f"{e.robot_speed:.3f}",
             f"{e.closing_speed:.2f}",
             "-" if e.towards_speed is None else f"{e.towards_speed:.2f}",

@@ -131,7 +131,9 @@ def of_fast(screen: Console, folder: Path) -> None:
     never = Encounter(-0.123, 12.34, None, 0.123, -0.12, None, 1.25, 1234.5, None)
     touched = replace(never, contact=12.34, fastest_in_contact=1.2, towards_speed=-0.123)
     names = {"fixed": never, "pick-and-place": touched}
-    runs = [SimpleNamespace(experiment=name, speed=1.6, encounter=item) for name, item in names.items()]
+    runs = [
+        SimpleNamespace(experiment=name, speed=1.6, moving_links=0.123, encounter=item) for name, item in names.items()
+    ]
     fast_person.show(runs, screen)  # type: ignore[arg-type]
 
 
