@@ -39,11 +39,16 @@ class Window(NamedTuple):
     sick: NDArray[np.intp]  # spots, or range sensors
     names: tuple[str, ...]
     before: Array  # readings in the tick before the fault
-    healthy: Record  # the first tick as it would have been
+    run: list[Record]  # the ticks as they would have been
     ticks: list[Record]
     after: str  # severity after acknowledging at the end
     rules: SensingRules
     dt: float
+
+    @property
+    def healthy(self) -> Record:
+        """The first tick as it would have been."""
+        return self.run[0]
 
 
 class Reaction(NamedTuple):

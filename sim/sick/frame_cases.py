@@ -91,8 +91,9 @@ def _stopped(window: Window, case: FrameCase) -> Reaction:
 
 
 def _harmless(window: Window, case: FrameCase) -> Reaction:
-    """Somebody who counted still does; whether it is noticed depends on what is known before the sensor."""
-    return Reaction(1 if not window.healthy.cdf_n > 0.0 or all(r.cdf_n > 0.0 for r in window.ticks) else None)
+    """Who would count does; whether it is noticed depends on what is known before the sensor."""
+    pairs = zip(window.ticks, window.run, strict=True)
+    return Reaction(1 if all(now.cdf_n > 0.0 or not would.cdf_n > 0.0 for now, would in pairs) else None)
 
 
 NAMED, FROZEN, KEPT, STOPS, HARMLESS = (

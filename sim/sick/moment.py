@@ -60,7 +60,7 @@ def at_moment(loop: FixedLoop, before: Array, cases: Sequence[Case | FrameCase],
         parts = [part.severity for part in (controller.ranging,) if part is not None]
         parts += [] if controller.sensing is None else [controller.sensing.health.severity]
         after = next((severity for severity in ("stopped", "capped") if severity in parts), "clear")
-        window = Window(sick, loop.sensor_names, before, healthy[0], ticks, after, controller.rules, controller.dt)
+        window = Window(sick, loop.sensor_names, before, healthy, ticks, after, controller.rules, controller.dt)
         gap = min(record.gap for record in ticks)
         contact = gap <= 0.0 < quiet
         results.append(Outcome(case.reaction(window), contact, _excess(loop, ticks), gap, quiet))

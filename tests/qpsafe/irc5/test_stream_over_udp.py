@@ -180,7 +180,8 @@ def test_whatever_ends_the_stream_the_last_answers_are_a_pose_at_rest(end: str, 
     assert stream.process.returncode == code
     assert stream.report["at_rest"] is True
     assert stream.report["good"] is (code == 0)
-    assert stream.report["causes"][0] == words
+    any_of = ("SIGHUP", "SIGQUIT", "Ctrl-C", "SIGTERM")  # all are pending at once: any of them may come first
+    assert stream.report["causes"][0] in (any_of if end == "signals" else (words,))
     assert code == 0 or stream.report["troubles"] == [words]
     assert not any("Traceback" in line for line in stream.said)
     ending = ".qpref.part" if end == "log" else ".qpref"
