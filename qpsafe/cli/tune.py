@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.sim.campaign.plan import Plan
+    from qpsafe.sim.tuning.journal import Journal
     from qpsafe.sim.tuning.judge import Judged
     from qpsafe.sim.tuning.result import Tuned
-    from qpsafe.sim.tuning.search import Progress
+    from qpsafe.sim.tuning.search import Progress, Search
 
 WHERE = "qpsafe tune"
 JOURNAL = "search.jsonl"
@@ -41,6 +42,9 @@ def tune(
     minutes: Annotated[float | None, typer.Option(min=0.0, help="No more are begun after this time.")] = None,
     seed: Annotated[int, typer.Option(help="Number of the search, 0 to 99: of its people and all else random.")] = 0,
     prefer: Annotated[str, typer.Option(help="What is chosen of the front: safety, balanced or work.")] = "balanced",
+    finals: Annotated[
+        int, typer.Option(min=0, help="New encounters by which the choice is made among the best; 0 for none.")
+    ] = 972,
     judge: Annotated[int, typer.Option(min=0, help="Encounters that judge the choice; 0 for none.")] = 1200,
     workers: Workers = WORKERS,
     dask: Dask = None,
@@ -62,6 +66,7 @@ def tune(
     """
     screen = console(json)
     require("tune", WHERE, "optuna", "pyarrow")
+    from qpsafe.sim.tuning.finals import MOST as FINALS
     from qpsafe.sim.tuning.front import PREFERENCES
     from qpsafe.sim.tuning.search import MOST, Search
 
@@ -69,6 +74,8 @@ def tune(
         raise ConfigurationError(WHERE, "--prefer", prefer, "one of " + ", ".join(PREFERENCES))
     if not 0 <= seed <= MOST:
         raise ConfigurationError(WHERE, "--seed", seed, f"a whole number from 0 to {MOST}")
+    if finals > FINALS:
+        raise ConfigurationError(WHERE, "--finals", finals, f"at most {FINALS:,}")
     plan = _plan(robot, program, cell, people)
     if write:
         _own(plan.robot)
@@ -76,7 +83,8 @@ def tune(
     folder = Path("out") / f"tune-{search.plan.digest()[:8]}" if out is None else out
     with executor_at(dask) as executor, _kept(folder, screen):
         crew = {"executor": executor, "workers": workers}
-        found = _searched(search, trials, folder, minutes, prefer, screen, crew)
+        journal = _searched(search, trials, folder, minutes, screen, crew)
+        found = _chosen(search, journal, finals, prefer, screen, crew)
         judged = _judged(found, folder, judge, screen, crew)
     _report(found, judged, folder, screen, json)
     if write:
@@ -109,8 +117,8 @@ def _own(robot: str) -> None:
 
 
 def _searched(
-    search: Any, trials: int, folder: Path, minutes: float | None, prefer: str, screen: Console, crew: dict[str, Any]
-) -> Tuned:
+    search: Search, trials: int, folder: Path, minutes: float | None, screen: Console, crew: dict[str, Any]
+) -> Journal:
     """Search with a progress bar that shows the present front.
 
     Args:
@@ -118,20 +126,44 @@ def _searched(
         trials: How many.
         folder: Of its journal.
         minutes: At most.
-        prefer: What is chosen.
         screen: Where to.
         crew: Who plays.
     """
-    from qpsafe.sim.tuning.result import Tuned
     from qpsafe.sim.tuning.search import run_search
 
     screen.print("Loading (the first time, compiling the kernels takes a minute) ...", style="dim")
     with progress_bar(screen) as bar:
-        journal = run_search(
+        return run_search(
             search, trials, folder / JOURNAL, progress=_shown(bar, trials), minutes=minutes,
-            notice=lambda text: screen.print(text, style="yellow"), **crew,
+            notice=_notice(screen), **crew,
         )  # fmt: skip
-    return Tuned.of(search, search.space(), journal, prefer)
+
+
+def _chosen(
+    search: Search, journal: Journal, encounters: int, prefer: str, screen: Console, crew: dict[str, Any]
+) -> Tuned:
+    """Choose, by the finals if there are any.
+
+    Args:
+        search: Which.
+        journal: Of it.
+        encounters: Of the finals; none for 0.
+        prefer: What is chosen.
+        screen: Where to.
+        crew: Who plays.
+    """
+    from qpsafe.sim.tuning.finals import finalists, run_finals
+    from qpsafe.sim.tuning.result import Tuned
+
+    met = []
+    if encounters and finalists(journal.trials):
+        with counting("runs of the finals", screen) as count:
+            met = run_finals(search, journal, encounters, progress=count, notice=_notice(screen), **crew)
+    return Tuned.of(search, search.space(), journal, prefer, met)
+
+
+def _notice(screen: Console) -> Callable[[str], None]:
+    return lambda text: screen.print(text, style="yellow")
 
 
 def _shown(bar: Any, trials: int) -> Progress:
@@ -215,7 +247,9 @@ def _report(found: Tuned, judged: Judged | None, folder: Path, screen: Console, 
 def _show(said: dict[str, Any], screen: Console) -> None:
     from qpsafe.cli.sheet import Sheet
 
-    sheet = Sheet("The front, on the search's encounters", ("", "harm", "work lost [s]"))
+    sheet = Sheet(
+        "The front" if said["finals"] is None else "The front, among new people", ("", "harm", "work lost [s]")
+    )
     for name, point in (("present", said["present"]), *((f"trial {p['number']}", p) for p in said["front"])):
         chosen = " *" if name != "present" and point["number"] == said["chosen"]["number"] else ""
         sheet.add_row(name + chosen, f"{point['harm']:.4f}", f"{point['lost']:.3f}")

@@ -128,6 +128,23 @@ class Given:
 
 
 @contextmanager
+def crew_at_work(executor: Executor | None, workers: int) -> Iterator[Crew]:
+    """Who plays: released at the end, and at once if that is an exception.
+
+    Args:
+        executor: Any of `concurrent.futures`, or Dask's; None for processes of our own.
+        workers: Processes, if there is no executor; 1 for none but this one.
+    """
+    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
+    good = False
+    try:
+        yield crew
+        good = True
+    finally:
+        crew.close(at_once=not good)
+
+
+@contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Ctrl-C waits meanwhile, and never reaches processes that are started in here: they inherit what is held."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows

@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from qpsafe.errors import QpsafeError
-from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
+from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.rows import Columns, columns_of, joined
 from qpsafe.sim.campaign.store import Played, Store, read, stored_plan, stored_versions, versions
@@ -108,30 +108,26 @@ def run_campaign(
     play = partial(play_trials, trial or _engine(), plan)
     store = None if out is None else Store(out, plan)
     finished = set() if store is None else store.trials() & set(range(plan.trials))
-    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
     parts: list[Played] = []
-    count, kept, good = len(finished), perf_counter(), False
+    count, kept = len(finished), perf_counter()
     if progress is not None:
         progress(count, plan.trials)
-    try:
-        with closing(answers(crew, play, _pieces(plan.trials, finished), notice)) as found:
-            for part in found:
-                parts.append(part)
-                count += len(part.columns["trial"]) // len(plan.controllers)
-                if progress is not None:
-                    progress(count, plan.trials)
-                full = CHUNK * len(parts) >= KEEP_MOST or perf_counter() - kept >= keep_every
-                if store is not None and full:
-                    store.keep(parts)
-                    parts.clear()
-                    kept = perf_counter()
-        good = True
-    finally:
+    with crew_at_work(executor, workers) as crew:
         try:
+            with closing(answers(crew, play, _pieces(plan.trials, finished), notice)) as found:
+                for part in found:
+                    parts.append(part)
+                    count += len(part.columns["trial"]) // len(plan.controllers)
+                    if progress is not None:
+                        progress(count, plan.trials)
+                    full = CHUNK * len(parts) >= KEEP_MOST or perf_counter() - kept >= keep_every
+                    if store is not None and full:
+                        store.keep(parts)
+                        parts.clear()
+                        kept = perf_counter()
+        finally:
             if store is not None:
                 store.keep(parts)
-        finally:
-            crew.close(at_once=not good)
     if store is None:
         whole = Played(joined([p.columns for p in parts], plan.controllers), sum(p.seconds for p in parts))
     else:

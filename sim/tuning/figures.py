@@ -15,13 +15,17 @@ _STOPPED, _REFUSED, _WHOLE, _FRONT, _CHOSEN = "#c9d3dc", "#f2b8a0", "#7fb3d5", "
 
 
 def front_figure(said: Mapping[str, Any]) -> Figure:
-    """Harm against work lost: every trial, the front, the present values and the chosen ones.
+    """Harm against work lost, less the present values': every trial, the finals, the front and the chosen values.
+
+    Trials and finals met different people, so each is shown against the present values among the same ones.
 
     Args:
         said: A result, see `qpsafe.sim.tuning.result`.
     """
     figure, (axis,) = panels(1, 1, 7.6, 4.6)
+    start, finals = said["trials"][0], said["finals"]
     trials, best = said["trials"], said["front"]
+    now, finalists = (start, []) if finals is None else (finals["finalists"][0], finals["finalists"][1:])
     counted = [t for t in trials if t["whole"] and t["violation"] == 0.0]
     kinds = (
         ("stopped early", _STOPPED, [t for t in trials if not t["whole"]]),
@@ -29,14 +33,22 @@ def front_figure(said: Mapping[str, Any]) -> Figure:
         ("all encounters", _WHOLE, counted),
     )
     for label, colour, mine in kinds:
-        axis.plot(*_places(mine), "o", color=colour, markersize=3.5, label=label)
-    axis.plot(*_places(best), "o-", color=_FRONT, markersize=4.5, linewidth=1.0, label="front")
-    axis.plot(*_places([said["present"]]), "X", color="#c0392b", markersize=9, label="present values")
-    axis.plot(*_places([said["chosen"]]), "*", color=_CHOSEN, markersize=13, label="chosen")
-    axis.set(xlabel="work lost an encounter [s]", ylabel="harm")
-    shown = [*best, said["present"], *counted]
-    for limits, values in ((axis.set_xlim, _places(shown)[0]), (axis.set_ylim, _places(shown)[1])):
-        room = 0.08 * (max(values) - min(values)) or 0.1 * max(values[0], 1e-3)
+        axis.plot(*_places(mine, start), "o", color=colour, markersize=3.5, label=label)
+    for there in finalists:
+        (x0, x1), (y0, y1) = zip(_place(trials[there["number"]], start), _place(there, now), strict=True)
+        axis.plot((x0, x1), (y0, y1), ":", color=_FRONT, linewidth=0.8)
+    if finalists:
+        axis.plot(*_places(finalists, now), "s", color=_FRONT, markersize=4.5, label="the same among new people")
+    axis.plot(*_places(best, now), "-", color=_FRONT, linewidth=1.2, label="front")
+    axis.plot(*_places([now], now), "X", color="#c0392b", markersize=9, label="present values")
+    axis.plot(*_places([said["chosen"]], now), "*", color=_CHOSEN, markersize=13, label="chosen")
+    axis.set(xlabel="work lost an encounter, less the present values' [s]", ylabel="harm, less the present values'")
+    xs, ys = _places(counted, start)
+    for limits, values, more in zip(
+        (axis.set_xlim, axis.set_ylim), (xs, ys), _places([*best, *finalists], now), strict=True
+    ):
+        values = [0.0, *values, *more]
+        room = 0.08 * (max(values) - min(values)) or 1e-3
         limits(min(values) - room, max(values) + room)  # early stops far outside are not shown
     legend_below(figure, axis, 3)
     return figure
@@ -60,5 +72,10 @@ def sensitivity_figure(shares: Mapping[str, Mapping[str, float]]) -> Figure:
     return figure
 
 
-def _places(points: Sequence[Mapping[str, Any]]) -> tuple[list[float], list[float]]:
-    return [p["lost"] for p in points], [p["harm"] for p in points]
+def _place(point: Mapping[str, Any], start: Mapping[str, Any]) -> tuple[float, float]:
+    return point["lost"] - start["lost"], point["harm"] - start["harm"]
+
+
+def _places(points: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> tuple[list[float], list[float]]:
+    places = [_place(point, start) for point in points]
+    return [x for x, _ in places], [y for _, y in places]

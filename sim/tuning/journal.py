@@ -1,4 +1,5 @@
-"""What a search has done so far, as lines of JSON: the first says what is searched, each other one holds a batch.
+"""What a search has done so far, as lines of JSON: the first says what is searched, each other one holds a batch,
+or some finalists of the finals.
 
 A line is on the disk before the next batch begins; what a killed process left half written is cut off. A batch that is
 not there is played again, and gives the same.
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.tuning.objectives import Played
+from qpsafe.sim.tuning.objectives import Outcome, Played
 from qpsafe.sim.tuning.trial import Trial, played_from_dict, played_to_dict
 from qpsafe.text.json_text import json_text
 
@@ -36,6 +37,8 @@ class Journal:
         self.trials: list[Trial] = []
         #: Outcomes of the present values; None as long as they have not been played.
         self.reference: Played | None = None
+        #: Outcomes in the finals, by number of the trial.
+        self.finals: dict[int, list[Outcome]] = {}
         #: Processor time of all batches [s].
         self.seconds = 0.0
         said = json.loads(json_text({"format": FORMAT, "identity": identity}))
@@ -74,13 +77,29 @@ class Journal:
         line = {"trials": [trial.to_dict() for trial in trials], "seconds": seconds}
         if reference is not None:
             line["reference"] = played_to_dict(reference)
+        self._keep(line)
+
+    def keep_finals(self, runs: Mapping[int, tuple[int, Sequence[Outcome]]], seconds: float) -> None:
+        """Add outcomes of finals.
+
+        Args:
+            runs: By number of the trial: the first encounter's number, and outcomes from it on.
+            seconds: That processes spent on it.
+        """
+        finals = {str(number): [first, [list(run) for run in mine]] for number, (first, mine) in runs.items()}
+        self._keep({"finals": finals, "seconds": seconds})
+
+    def _keep(self, line: Mapping[str, Any]) -> None:
         if self._path is not None:
             self._write(line)
         self._take(json.loads(json_text(line)))
 
     def _take(self, line: Mapping[str, Any]) -> None:
-        self.trials += [Trial.from_dict(said) for said in line["trials"]]
+        self.trials += [Trial.from_dict(said) for said in line.get("trials", ())]
         self.seconds += line["seconds"]
+        for number, (first, runs) in line.get("finals", {}).items():
+            before = self.finals.get(int(number), [])
+            self.finals[int(number)] = before[:first] + [Outcome(*run) for run in runs]
         if "reference" in line:
             self.reference = played_from_dict(line["reference"])
 

@@ -30,6 +30,8 @@ def _sections(said: dict[str, Any]) -> Iterator[Html]:
         "them, the others were stopped early. Each objective is a mean over encounters.",
         class_="soft",
     )
+    if said["finals"] is not None:
+        yield element("p", _finals(said), class_="soft")
     taken = said["judgement"] is not None and said["judgement"]["worth"]
     yield element("p", said["sentence"], class_="fine" if taken or said["chosen"]["number"] == 0 else "fault")
     yield element("h2", "The front")
@@ -51,6 +53,14 @@ def _sections(said: dict[str, Any]) -> Iterator[Html]:
     yield element("pre", (objectives.__doc__ or "").strip())
     yield table(("key", "value"), [(key, str(value)) for key, value in said["plan"].items()], range(2))
     yield element("p", f"Run: {said['run']}; {said['search']['processor_s']:,.0f} s of processes.", class_="soft")
+
+
+def _finals(said: dict[str, Any]) -> str:
+    (first, last), some = said["finals"]["encounters"], len(said["finals"]["finalists"]) - 1
+    return (
+        f"Finals: {counted(some, 'trial')} and the present values met {last - first + 1:,} others, seeds {first} to "
+        f"{last}. The front, the choice and their figures are of these."
+    )
 
 
 def _figure(image: str, caption: str) -> Html:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from qpsafe.sim.tuning.finals import MOST
 from qpsafe.sim.tuning.front import knee
 from qpsafe.sim.tuning.judge import Judged, sentence
 from qpsafe.sim.tuning.sensitivity import sensitivity
@@ -22,7 +24,8 @@ class Tuned(NamedTuple):
         search: Which.
         space: Where it looked.
         trials: All.
-        best: The front, from little harm to little work lost.
+        finalists: The present values and those that met new people, with their figures there; empty without finals.
+        best: The front, from little harm to little work lost: of the finalists, or of all trials without finals.
         chosen: Of it.
         prefer: By which preference.
         seconds: Processor time of the search [s].
@@ -31,13 +34,14 @@ class Tuned(NamedTuple):
     search: Search
     space: Space
     trials: list[Trial]
+    finalists: list[Trial]
     best: list[Trial]
     chosen: Trial
     prefer: str
     seconds: float
 
     @classmethod
-    def of(cls, search: Search, space: Space, journal: Journal, prefer: str) -> Tuned:
+    def of(cls, search: Search, space: Space, journal: Journal, prefer: str, finalists: Sequence[Trial] = ()) -> Tuned:
         """From what a search has kept.
 
         Args:
@@ -45,11 +49,17 @@ class Tuned(NamedTuple):
             space: Where it looked.
             journal: What it has kept, the present values at least.
             prefer: A key of `qpsafe.sim.tuning.front.PREFERENCES`.
+            finalists: See `qpsafe.sim.tuning.finals.run_finals`; the choice is among them, if there are any.
         """
-        best = front_of(journal.trials) or journal.trials[:1]  # the present values themselves pass a limit
-        start = journal.trials[0].objectives
-        chosen = best[knee([trial.objectives for trial in best], start, prefer)]
-        return cls(search, space, journal.trials, best, chosen, prefer, journal.seconds)
+        among = list(finalists) or journal.trials
+        best = front_of(among) or among[:1]  # the present values themselves pass a limit
+        chosen = best[knee([trial.objectives for trial in best], among[0].objectives, prefer)]
+        return cls(search, space, journal.trials, list(finalists), best, chosen, prefer, journal.seconds)
+
+    @property
+    def start(self) -> Trial:
+        """The present values, on the encounters of the front."""
+        return (self.finalists or self.trials)[0]
 
     @property
     def run(self) -> str:
@@ -72,9 +82,10 @@ def result(found: Tuned, judged: Judged | None) -> dict[str, Any]:
         "robot": plan.robot,
         "run": found.run,
         "sentence": said(found, judged),
-        "present": _point(found, found.trials[0]),
+        "present": _point(found, found.start),
         "chosen": _point(found, found.chosen),
         "front": [_point(found, trial) for trial in found.best],
+        "finals": _finals(found),
         "judgement": None if judged is None else judged.to_dict(),
         "sensitivity": sensitivity(space, found.trials),
         "space": [d._asdict() for d in space.dimensions],
@@ -100,6 +111,14 @@ def said(found: Tuned, judged: Judged | None) -> str:
     if found.chosen.number == 0:
         return f"The present values were already as good: none of {len(found.trials) - 1:,} others was chosen."
     return "Not judged yet: figures are those of the search, which chose by them."
+
+
+def _finals(found: Tuned) -> dict[str, Any] | None:
+    if not found.finalists:
+        return None
+    first = found.search.plan.seed + MOST
+    points = [{"number": t.number, "harm": t.score.harm, "lost": t.score.lost} for t in found.finalists]
+    return {"encounters": [first, first + found.finalists[0].encounters - 1], "finalists": points}
 
 
 def _point(found: Tuned, trial: Trial) -> dict[str, Any]:

@@ -6,36 +6,31 @@ to servos with lag. Values that were stopped are told to the sampler by their pa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
-from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
+from qpsafe.sim.campaign.executors import crew_at_work
 from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
-from qpsafe.sim.tuning.front import Objectives, ranks
+from qpsafe.sim.tuning.hall import LAGS, Hall
 from qpsafe.sim.tuning.journal import Journal
-from qpsafe.sim.tuning.objectives import Outcome, Played, Score, score
-from qpsafe.sim.tuning.play import Piece, PieceFunction, lagged, pieces, play_piece, timed
-from qpsafe.sim.tuning.space import Point, Space
-from qpsafe.sim.tuning.trial import Trial, front_of
+from qpsafe.sim.tuning.objectives import score
+from qpsafe.sim.tuning.play import PieceFunction
+from qpsafe.sim.tuning.space import Space
+from qpsafe.sim.tuning.trial import Trial
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from qpsafe.sim.campaign.plan import Plan
 
-#: First seeds of encounters: of searches, 10,000 apart, and of the judgement. Campaigns have those below.
+#: First seeds of encounters: of searches, 10,000 apart, of which the second half is for the finals, and of the
+#: judgement. Campaigns have those below.
 SEARCH, JUDGE, APART, MOST = 7_000_000, 8_000_000, 10_000, 99
-#: Servo lags that values must be steady with, in ticks: 8 and 20 ms.
-LAGS = (2, 5)
-#: Encounters that processes take together.
-SIZE = 6
 TRIALS = 400
 
 
@@ -121,10 +116,8 @@ def run_search(
     """
     begun, space = monotonic(), search.space()
     kept = Journal(journal, search.identity())
-    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
-    good = False
-    try:
-        hall = _Hall(search, space, crew, play or play_piece, notice)
+    with crew_at_work(executor, workers) as crew:
+        hall = Hall(search, space, crew, play, notice)
         if progress is not None:
             progress(len(kept.trials), kept)
         while len(kept.trials) < trials:
@@ -139,95 +132,4 @@ def run_search(
                 kept.keep(hall.batch(points, kept), hall.spent())
             if progress is not None:
                 progress(len(kept.trials), kept)
-        good = True
-    finally:
-        crew.close(at_once=not good)
     return kept
-
-
-class _Hall:
-    """Where batches are played."""
-
-    def __init__(
-        self,
-        search: Search,
-        space: Space,
-        crew: Crew,
-        play: PieceFunction,
-        notice: Callable[[str], None] | None,
-    ) -> None:
-        self._search, self._space, self._crew, self._notice = search, space, crew, notice
-        self._play, self._seconds = partial(timed, play), 0.0
-
-    def spent(self) -> float:
-        """Processes' time since it was last asked for [s]."""
-        found, self._seconds = self._seconds, 0.0
-        return found
-
-    def whole(self, point: Point) -> Played:
-        """A point in all encounters, and with all lags."""
-        plan, rungs = self._search.plan, self._search.rungs
-        (plain,) = self._runs(plan, range(rungs.encounters[-1]), [point])
-        return {0: plain} | {lag: self._lagged(lag, [point])[0] for lag in LAGS}
-
-    def batch(self, points: Sequence[Point], kept: Journal) -> list[Trial]:
-        """A batch, rung by rung.
-
-        Args:
-            points: Asked for.
-            kept: The trials before.
-        """
-        assert kept.reference is not None
-        rungs, plan = self._search.rungs, self._search.plan
-        played: list[Played] = [{0: []} for _ in points]
-        going, done = list(range(len(points))), 0
-        for level, count in enumerate(rungs.encounters):
-            for k, runs in zip(going, self._runs(plan, range(done, count), [points[k] for k in going]), strict=True):
-                played[k][0] += runs
-            done = count
-            if level < len(rungs.goes_on):
-                scores = {k: score(played[k], kept.reference) for k in going}
-                going = promising(scores, kept.trials, max(1, round(rungs.goes_on[level] * len(points))))
-        for lag in LAGS:
-            for k, runs in zip(going, self._lagged(lag, [points[k] for k in going]), strict=True):
-                played[k][lag] = runs
-        first, number = len(kept.trials), kept.batches
-        return [
-            Trial(first + k, number, point, len(runs[0]), k in going, score(runs, kept.reference))
-            for k, (point, runs) in enumerate(zip(points, played, strict=True))
-        ]
-
-    def _lagged(self, lag: int, points: Sequence[Point]) -> list[list[Outcome]]:
-        return self._runs(lagged(self._search.plan, lag), range(self._search.rungs.lagged), points)
-
-    def _runs(self, plan: Plan, encounters: range, points: Sequence[Point]) -> list[list[Outcome]]:
-        """Outcomes of each point in each encounter."""
-        work: list[Piece] = pieces(plan, encounters, [self._space.at(point) for point in points], SIZE)
-        found: dict[int, list[list[Outcome]]] = {}
-        with closing(answers(self._crew, self._play, list(enumerate(work)), self._notice)) as parts:
-            for number, runs, seconds in parts:
-                found[number] = runs
-                self._seconds += seconds
-        rows = [row for number in sorted(found) for row in found[number]]
-        return [[row[k] for row in rows] for k in range(len(points))]
-
-
-def promising(scores: dict[int, Score], trials: Sequence[Trial], count: int) -> list[int]:
-    """Who goes on: those that keep the constraints first, then those whom fewer dominate, then those whose worse
-    objective, as a share of the present values', is smaller: what is better in both goes before what trades.
-
-    Args:
-        scores: Of a batch, by number.
-        trials: Before it: those of their front dominate, too.
-        count: How many.
-    """
-    start = trials[0].objectives
-    numbers, before = list(scores), [trial.objectives for trial in front_of(trials)]
-    dominated = ranks([Objectives(scores[k].harm, scores[k].lost) for k in numbers] + before)
-
-    def key(place: int) -> tuple[float, int, float, float, int]:
-        mine = scores[numbers[place]]
-        shares = (mine.harm / max(start.harm, 1e-9), mine.lost / max(start.lost, 1e-9))
-        return mine.violation, dominated[place], max(shares), sum(shares), numbers[place]
-
-    return sorted(numbers[place] for place in sorted(range(len(numbers)), key=key)[:count])

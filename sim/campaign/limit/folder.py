@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
+from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.limit.row import Limit, limit_from
 from qpsafe.sim.campaign.limit.search import EVALUATIONS
 from qpsafe.sim.campaign.plan import Plan
@@ -67,23 +67,22 @@ def limits_of(
     found = {item.trial: item for item in _read(file, head)} if file.exists() else {}
     _write(file, head, found.values())
     todo = [trial for trial in wanted if trial not in found]
-    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
-    search, good, done = partial(_one, limit or _limit, plan, controller, evaluations), False, len(wanted) - len(todo)
+    search, done = partial(_one, limit or _limit, plan, controller, evaluations), len(wanted) - len(todo)
     if progress is not None:
         progress(done, len(wanted))
-    try:
-        with file.open("a", encoding="utf-8") as kept, closing(answers(crew, search, todo)) as answered:
-            for item in answered:
-                found[item.trial] = item
-                kept.write(_line(item._asdict()))
-                kept.flush()
-                done += 1
-                if progress is not None:
-                    progress(done, len(wanted))
-        _write(file, head, found.values())  # in order: the same file whoever searched
-        good = True
-    finally:
-        crew.close(at_once=not good)
+    with (
+        crew_at_work(executor, workers) as crew,
+        file.open("a", encoding="utf-8") as kept,
+        closing(answers(crew, search, todo)) as answered,
+    ):
+        for item in answered:
+            found[item.trial] = item
+            kept.write(_line(item._asdict()))
+            kept.flush()
+            done += 1
+            if progress is not None:
+                progress(done, len(wanted))
+    _write(file, head, found.values())  # in order: the same file whoever searched
     return tuple(found[trial] for trial in wanted)
 
 

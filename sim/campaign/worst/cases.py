@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.executors import Alone, Crew, Given, Processes, answers
+from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.worst.search import Found, search_worst
 
@@ -63,21 +63,15 @@ def find_worst(
         WorkerDiedError: A process died twice of the same encounter.
     """
     free = _continuous(plan) if continuous is None else continuous
-    crew: Crew = Given(executor) if executor is not None else Processes(workers) if workers > 1 else Alone()
     play = partial(_play, case or _engine(), plan, controller)
+    with crew_at_work(executor, workers) as crew:
 
-    def evaluate(points: NDArray[np.float64]) -> list[dict[str, Any]]:
-        pieces = [(k, encounter_of(plan, u)) for k, u in enumerate(points.tolist())]
-        return [row for _, row in sorted(answers(crew, play, pieces), key=lambda found: found[0])]
+        def evaluate(points: NDArray[np.float64]) -> list[dict[str, Any]]:
+            pieces = [(k, encounter_of(plan, u)) for k, u in enumerate(points.tolist())]
+            return [row for _, row in sorted(answers(crew, play, pieces), key=lambda found: found[0])]
 
-    good = False
-    try:
         # the first coordinate chooses the motion
-        found = search_worst(evaluate, 1 + len(free), budget, plan.seed, np.append([False], free), progress)
-        good = True
-        return found
-    finally:
-        crew.close(at_once=not good)
+        return search_worst(evaluate, 1 + len(free), budget, plan.seed, np.append([False], free), progress)
 
 
 def encounter_of(plan: Plan, u: Sequence[float]) -> Encounter:

@@ -36,7 +36,7 @@ def _made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         sooner = 0.5 if "tune" in plan.robot else 0.0
         return [row | quiet | {"lost_time": row["lost_time"] - sooner} for row in rows]
 
-    monkeypatch.setattr("qpsafe.sim.tuning.search.play_piece", made_up_values.play)
+    monkeypatch.setattr("qpsafe.sim.tuning.hall.play_piece", made_up_values.play)
     monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: judged)
     monkeypatch.chdir(tmp_path)
 
@@ -79,7 +79,7 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(monkeypatch:
         return made_up_values.play(piece)
 
     with monkeypatch.context() as patched:
-        patched.setattr("qpsafe.sim.tuning.search.play_piece", interrupted)
+        patched.setattr("qpsafe.sim.tuning.hall.play_piece", interrupted)
         stopped = tune(*FEW, "--out", "cut")
     assert stopped.exit_code != 0
     assert "finished trials are kept in cut: the same command goes on there" in stopped.output
