@@ -23,7 +23,7 @@ from qpsafe.sim.tuning.robot_file import MARK, farthest
 from qpsafe.sim.tuning.space import Space
 from qpsafe.sim.tuning.values import present
 
-FEW = ["--trials", "25", "--workers", "1", "--judge", "24"]
+FEW = ["--trials", "17", "--workers", "1", "--judge", "24", "--finals", "30"]
 
 
 @pytest.fixture(autouse=True)
@@ -61,26 +61,30 @@ def test_a_search_is_kept_judged_reported_and_printed(tmp_path: Path) -> None:
     assert farthest(present(robot), chosen) < 1e-12
     assert said["run"] in (tmp_path / "tuned" / "robot" / "robot.toml").read_text(encoding="utf-8")
     assert said["search"]["encounters"] == [7_020_000, 7_020_215]
+    assert said["finals"]["encounters"] == [7_025_000, 7_025_029]
+    assert f"{len(said['finals']['finalists']) - 1} trials and the present values met 30 others" in page
     assert said["judgement"]["seed"] == 8_000_000
     # again: nothing is played, and the same is printed as JSON
     again = tune(*FEW, "--out", "tuned", "--seed", "2", "--json")
     assert json.loads(again.stdout) == said
 
 
-def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("at", [60, 140])  # in the search, in the finals
+def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(monkeypatch: pytest.MonkeyPatch, at: int) -> None:
     whole = json.loads(tune(*FEW, "--out", "whole", "--json").stdout)
     calls = 0
 
     def interrupted(piece: Any) -> Any:
         nonlocal calls
         calls += 1
-        if calls == 60:
+        if calls == at:
             raise KeyboardInterrupt
         return made_up_values.play(piece)
 
     with monkeypatch.context() as patched:
         patched.setattr("qpsafe.sim.tuning.hall.play_piece", interrupted)
         stopped = tune(*FEW, "--out", "cut")
+    assert calls == at
     assert stopped.exit_code != 0
     assert "finished trials are kept in cut: the same command goes on there" in stopped.output
     again = json.loads(tune(*FEW, "--out", "cut", "--json").stdout)
@@ -113,6 +117,12 @@ def test_what_is_not_better_is_not_written(tmp_path: Path, monkeypatch: pytest.M
     assert (tmp_path / "own" / "robot.toml").read_text(encoding="utf-8") == text
 
 
+def test_without_finals_the_search_chooses() -> None:
+    said = json.loads(tune(*FEW, "--finals", "0", "--out", "x", "--json").stdout)
+    assert said["finals"] is None
+    assert said["chosen"]["number"] in {point["number"] for point in said["front"]}
+
+
 def test_with_one_trial_the_present_values_are_chosen_and_not_judged() -> None:
     said = json.loads(tune("--trials", "1", "--workers", "1", "--json", "--out", "x").stdout)
     assert said["chosen"]["number"] == 0
@@ -126,6 +136,7 @@ def test_with_one_trial_the_present_values_are_chosen_and_not_judged() -> None:
     [
         (["--prefer", "speed"], r"--prefer.*'speed'.*safety, balanced, work"),
         (["--seed", "100"], r"--seed.*100.*0 to 99"),
+        (["--finals", "5001"], r"--finals.*5001.*at most 5,000"),
         (["--program", "nowhere.toml"], r"--program.*nowhere.toml"),
         (["--people", "nowhere.toml"], r"--people.*nowhere.toml"),
         (["--cell", "nowhere.toml"], r"--cell.*nowhere.toml"),
