@@ -74,30 +74,16 @@ def renew(
 
 
 @entry(
-    types.int64(
-        types.float64[:, :, ::1],
-        _whole,
-        _whole,
-        _any,
-        _any,
-        _two,
-        _two,
-        _outs,
-        _whole,
-        _outs,
-        _whole,
-        _outs,
-        _out,
+    types.UniTuple(types.int64, 2)(
+        types.float64[:, :, ::1], _whole, _whole, _any, _any, _two, _two, _outs, _whole, _outs, _whole, _outs, _out,
         _out,
     ),
-    nearest_kernel,
-    prediction,
-    *prediction.USES,
-)
+    nearest_kernel, prediction, *prediction.USES,
+)  # fmt: skip
 def place_all(
     store: Array, counts: Index, carriers: Index, patience: Array, numbers: Array, starts: Array, ends: Array,
     points: Array, links: Index, velocities: Array, sensors: Index, seen: Array, ages: Array, leads: Array,
-) -> int:  # fmt: skip
+) -> tuple[int, int]:  # fmt: skip
     """Where all kept points count now; those that are too old are forgotten.
 
     Args:
@@ -115,9 +101,9 @@ def place_all(
             fast as `PERSON` would have had to come from there to be as far as this one may be (s r,) [s].
 
     Returns:
-        How many points count.
+        How many points count; of how many of these a velocity is known.
     """  # fmt: skip
-    now, total = numbers[NOW], 0
+    now, total, moving = numbers[NOW], 0, 0
     for s in range(store.shape[0]):
         left = 0
         for i in range(counts[s]):
@@ -153,15 +139,21 @@ def place_all(
             beyond = store[s, left, WRONG] + fast * (age + numbers[AHEAD])
             ages[total], leads[total] = age, age + beyond / max(usual, 1e-9)
             links[total], sensors[total] = link, s
+            moving += v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0
             left, total = left + 1, total + 1
         counts[s] = left
-    return total
+    return total, moving
 
 
-@entry(types.int64(_two, _whole, _whole, _any, types.int64, types.float64, _whole, types.int64[:, :, ::1], _whole))
+@entry(
+    types.int64(
+        _two, _whole, _two, _whole, _any, types.int64, types.float64, _whole, types.int64[:, :, ::1], _outs, _whole,
+        _outs,
+    )
+)  # fmt: skip
 def choose(
-    points: Array, links: Index, sensors: Index, danger: Array, most: int, apart: float, marks: Index, used: Index,
-    chosen: Index,
+    points: Array, links: Index, velocities: Array, sensors: Index, danger: Array, most: int, apart: float,
+    marks: Index, used: Index, chosen: Array, chosen_links: Index, chosen_velocities: Array,
 ) -> int:  # fmt: skip
     """Choose the points that count in eq. (8): of each link and sensor the most dangerous ones, and nothing twice.
 
@@ -169,12 +161,12 @@ def choose(
     nothing.
 
     Args:
-        points, links, sensors, danger: Of p points, see `place_all`.
+        points, links, velocities, sensors, danger: Of p points, see `place_all`.
         most: How many of each link and sensor.
         apart: Points of one link that are as near to each other as that are one thing [m].
         marks: To work in (p,).
         used: To work in (2, s, links): how often a sensor was heard for a link, and by which choice last.
-        chosen: Filled with their numbers, in falling order of danger (p,).
+        chosen, chosen_links, chosen_velocities: Filled, in falling order of danger (p, 3), (p,), (p, 3).
 
     Returns:
         How many were chosen.
@@ -190,7 +182,10 @@ def choose(
                 best = i
         if best < 0:
             return total
-        chosen[total], link, b = best, links[best], row(points, best)
+        link, b = links[best], row(points, best)
+        chosen_links[total] = link
+        for c in range(3):
+            chosen[total, c], chosen_velocities[total, c] = points[best, c], velocities[best, c]
         total += 1
         for i in range(count):
             w = add(row(points, i), -1.0, b)

@@ -23,6 +23,7 @@ from qpsafe.ranging.tracking.prediction import Foresight
 from qpsafe.ranging.tracking.velocities import MOST, Velocities
 from qpsafe.ranging.unseen import Together
 from qpsafe.ranging.watch import LATE, SensorWatch
+from qpsafe.robot.state import RobotState
 from qpsafe.sensing.body import surrounding_hulls
 from qpsafe.sensing.detection import BadInput
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
@@ -31,13 +32,13 @@ from qpsafe.sensing.rules import SensingRules
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.state import RobotState
     from qpsafe.robot.wire import Wire
 
 Array = NDArray[np.float64]
 
 #: How far ahead the gate looks at most: braking takes no longer [s].
 AHEAD = 0.5
+_ROUNDING = 1e-6  # of times, by far [s]
 
 
 class RangeSensing:
@@ -84,7 +85,8 @@ class RangeSensing:
         self._placed = np.empty((total, 3)), np.empty(total, dtype=np.int64), np.empty((total, 3))
         self._who, self._near = np.empty(total, dtype=np.int64), np.empty((total, 3))
         self._ages, self._leads = np.empty(total), np.empty(total)
-        self._marks, self._chosen = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+        self._marks = np.empty(total, dtype=np.int64)
+        self._chosen = np.empty((total, 3)), np.empty(total, dtype=np.int64), np.empty((total, 3))
         self._used = np.empty((2, count, links), dtype=np.int64)
         self._tracks = [Velocities(sensor.sigma) for sensor in self.sensors] if self.rules.predict else []
         self._foresight = Foresight(total)
@@ -148,6 +150,7 @@ class RangeSensing:
         self.stopped = self._doubted = False
         self._now = -inf
         self._begin = True  # sensors are waited for from the next tick on
+        self._until = -inf  # surely no sensor is silent before
 
     def acknowledge(self) -> None:
         """A person has looked: sensors that see again are trusted again, a stop they caused is lifted."""
@@ -177,7 +180,7 @@ class RangeSensing:
         notes = self._take_all(images, now, wire)
         notes += self._look(now)
         self._numbers[0], self._numbers[4] = now, person
-        total = place_all(
+        total, moving = place_all(
             self._store, self._counts, self._carriers, self._patience, self._numbers, wire.starts, wire.ends,
             *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
@@ -185,23 +188,19 @@ class RangeSensing:
         if not total:
             return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
         points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
-        points, velocities = self._ahead(points, velocities, wire, field)
+        if moving:
+            points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
         count = choose(
-            points,
-            links,
-            self._who[:total],
-            danger,
-            self.rules.most,
-            self.rules.apart,
-            self._marks,
-            self._used,
-            self._chosen,
-        )
-        chosen = self._chosen[:count]
-        near = np.concatenate((self._near[:total], hidden))
-        leads = np.concatenate((self._leads[:total], np.zeros(len(hidden))))
-        return Ranged(points[chosen], links[chosen], velocities[chosen], near, leads, tuple(notes))
+            points, links, velocities, self._who[:total], danger, self.rules.most, self.rules.apart,
+            self._marks, self._used, *self._chosen,
+        )  # fmt: skip
+        near, leads = self._near[:total], self._leads[:total]
+        if len(hidden):
+            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, np.zeros(len(hidden))))
+        else:  # not our memory of the next tick
+            near, leads = near.copy(), leads.copy()
+        return Ranged(*[part[:count].copy() for part in self._chosen], near, leads, tuple(notes))
 
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
@@ -210,9 +209,7 @@ class RangeSensing:
         return self._hidden_places
 
     def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:
-        """Where points count that come nearer, and their velocities there; at rest by a field of another making."""
-        if not velocities.any():
-            return points, velocities
+        """Where points that move count, and their velocities there; at rest by a field of another making."""
         if not self.sensing.velocities or type(field) is not DangerField:
             return points, np.zeros_like(velocities)
         elapsed, weights = self._ages[: len(points)] + self.rules.horizon, (field.static, field.kinetic, field.gamma)
@@ -235,7 +232,7 @@ class RangeSensing:
         wrong = watch.too_old(given.stamp, now)
         if wrong:
             return wrong
-        then = self._robot.at(self._past.at(given.stamp))
+        then = RobotState(self._robot, self._past.at(given.stamp))
         poses, (body, place) = then.body_poses(), self._mounts[who]
         pose = poses[body] @ place
         fixed = self.sensors[who].mount == WORLD
@@ -270,7 +267,10 @@ class RangeSensing:
         if self._begin:
             for watch in self._watches:
                 watch.begin = now
-            self._seen[:], self._begin = now, False
+            self._seen[:], self._begin, self._until = now, False, -inf
+        if not (self._doubted or now > self._until):
+            return []
+        self._until = float((self._seen + self._patience).min()) - _ROUNDING  # images that came since put it off
         if not (self._doubted or (now - self._seen > self._patience).any()):
             return []
         kinds: dict[str, list[str]] = {}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.ranging.looking_kernel import AROUND
 from qpsafe.ranging.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile
 
 if TYPE_CHECKING:
@@ -73,6 +74,17 @@ def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
     return replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=shape), size
 
 
+def view_of(directions: Array) -> tuple[float, ...]:
+    """The middle of all directions (z, 3), then cosine and sine of the cone around it that holds them."""
+    middle = directions.mean(axis=0)
+    size = float(np.linalg.norm(middle))
+    if size < 1e-3:  # all around
+        return 1.0, 0.0, 0.0, -1.0, 0.0
+    middle /= size
+    cosine = float(np.clip((directions @ middle).min(initial=1.0), -1.0, 1.0))
+    return *middle.tolist(), cosine, float(np.sqrt(1.0 - cosine * cosine))
+
+
 class Reducer:
     """Reduces the images of one sensor.
 
@@ -99,11 +111,16 @@ class Reducer:
         self._slants = np.tan(self.zones.half_angle)
         self._numbers = np.array([
             sensor.range_min, sensor.range_max, sensing.tolerance, rules.spread, rules.reach, rules.deviations,
+            *view_of(self.zones.directions),
         ])  # fmt: skip
         self._tables, self._each, self._support = hulls.tables, rules.each, rules.support
         self._stride = farthest_zone(count)
         self.found = np.empty((count, 4))
-        self._work = self.found, np.empty((links, count)), np.empty(count, dtype=np.int64)
+        things = len(hulls.tables[0])
+        self._work = (
+            self.found, np.empty((links, count)), np.empty(count, dtype=np.int64),
+            np.empty((things, AROUND)), np.empty((2, things), dtype=np.int64),
+        )  # fmt: skip
         self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
         self.distances, self.valid, self.sigma = np.empty(count), np.zeros(count, dtype=np.bool_), np.empty(count)
         self.kept = np.empty((links * rules.each, 4))

@@ -8,104 +8,32 @@ wire those that are nearest to it, spread apart, since what lies beside a nearer
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 
 import numpy as np
 from numba import types
 
-from qpsafe.compiled.compiled import Array, Vector, add, cross, dot, entry, inline, readable, row, scale
-from qpsafe.ranging import nearest_kernel
+from qpsafe.compiled.compiled import Array, add, entry, readable, row
+from qpsafe.ranging import looking_kernel, nearest_kernel
+from qpsafe.ranging.looking_kernel import (
+    DEVIATIONS,
+    FARTHEST,
+    NEAREST,
+    REACH,
+    SPREAD,
+    TOLERANCE,
+    blocked,
+    look_around,
+    turned,
+)
 from qpsafe.ranging.nearest_kernel import keep_nearest, to_link
-from qpsafe.robot.kinematics import Index, place
+from qpsafe.robot.kinematics import Index
 from qpsafe.sensing import hulls
 from qpsafe.sensing.hulls import within
 
 #: What an image shows, see `Told` in `qpsafe.ranging.reduce`.
 VALID, HITS, OWN, KNOWN, EXPECTED, THROUGH, IMPOSSIBLE, SEEN = range(8)
 SHOWN = 8
-#: Numbers of a call: the sensor's range, tolerance, how far points of a link are spread apart, how far away from the
-#: wire points still matter [m], by how many standard deviations a reading may be wrong.
-NEAREST, FARTHEST, TOLERANCE, SPREAD, REACH, DEVIATIONS = range(6)
-
-
-@inline
-def turned(T: Array, v: Vector) -> Vector:
-    """A direction of a frame's axes in the world."""
-    return (
-        T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
-        T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
-        T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
-    )
-
-
-@inline
-def enters(
-    o: Vector, a: Vector, farthest: float, carrier: int, poses: Array, bodies: Index, first: Index, planes: Array,
-    balls: Array,
-) -> float:  # fmt: skip
-    """How far along a ray known things begin; inf if there are none as near as `farthest`.
-
-    Those of the body that carries the sensor are left out, and those that the ray begins in.
-    """
-    nearest = inf
-    for h in range(bodies.shape[0]):
-        if bodies[h] == carrier:
-            continue
-        T = poses[bodies[h]]
-        c = place(T, balls[h, 0], balls[h, 1], balls[h, 2])
-        m = add(c, -1.0, o)
-        along, square, r2 = dot(m, a), dot(m, m), balls[h, 3] * balls[h, 3]
-        if square > r2 and (
-            along <= 0.0 or along - balls[h, 3] > min(farthest, nearest) or square - along * along > r2
-        ):
-            continue
-        # into the body's axes
-        x = T[0, 0] * -m[0] + T[1, 0] * -m[1] + T[2, 0] * -m[2] + balls[h, 0]
-        y = T[0, 1] * -m[0] + T[1, 1] * -m[1] + T[2, 1] * -m[2] + balls[h, 1]
-        z = T[0, 2] * -m[0] + T[1, 2] * -m[1] + T[2, 2] * -m[2] + balls[h, 2]
-        u = T[0, 0] * a[0] + T[1, 0] * a[1] + T[2, 0] * a[2]
-        v = T[0, 1] * a[0] + T[1, 1] * a[1] + T[2, 1] * a[2]
-        w = T[0, 2] * a[0] + T[1, 2] * a[1] + T[2, 2] * a[2]
-        begin, end, inside = 0.0, farthest, True
-        for k in range(first[h], first[h + 1]):
-            n0, n1, n2 = planes[k, 0], planes[k, 1], planes[k, 2]
-            height = n0 * x + n1 * y + n2 * z + planes[k, 3]
-            inside = inside and height <= 0.0
-            rise = n0 * u + n1 * v + n2 * w  # inside where height + t rise <= 0
-            if rise < 0.0:
-                begin = max(begin, -height / rise)
-            elif rise > 0.0:
-                end = min(end, -height / rise)
-            elif height > 0.0:
-                end = -1.0
-            if end < begin:
-                break
-        if begin <= end and not inside:
-            nearest = min(nearest, begin)
-    return nearest
-
-
-@inline
-def blocked(
-    o: Vector, a: Vector, slant: float, fat: float, farthest: float, carrier: int, poses: Array, bodies: Index,
-    first: Index, planes: Array, balls: Array,
-) -> float:  # fmt: skip
-    """How far a cone can be looked into at most before known things, which fill all of it; inf if they do not.
-
-    What a zone reads is about the distance along its axis, and no more than half of the way to the far edge beyond.
-    """
-    middle = enters(o, a, farthest, carrier, poses, bodies, first, planes, balls)
-    if middle == inf:
-        return inf
-    u = (0.0, a[2], -a[1]) if abs(a[0]) < 0.8 else (-a[2], 0.0, a[0])
-    u = scale(1.0 / sqrt(dot(u, u)), u)
-    v, wide, edge = cross(a, u), sqrt(0.5) * (slant + fat / max(middle, fat)), middle
-    for i in range(4):
-        b = add(add(a, wide if i < 2 else -wide, u), wide if i % 2 else -wide, v)
-        b = scale(1.0 / sqrt(dot(b, b)), b)
-        edge = max(edge, enters(o, b, farthest, carrier, poses, bodies, first, planes, balls))
-    return 0.5 * (middle + edge) + fat
-
 
 _ints = types.Array(types.int64, 1, "C", readonly=True)
 _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (2, 3))
@@ -115,10 +43,10 @@ _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1
 @entry(
     types.int64(
         readable(1), readable(1), types.Array(types.boolean, 1, "A", readonly=True), _two, readable(1), _two,
-        readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole,
+        readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole, _outs, types.int64[:, ::1],
         types.int64, types.int64, types.int64, _outs, _whole,
     ),
-    hulls, nearest_kernel,
+    hulls, looking_kernel, nearest_kernel,
 )  # fmt: skip
 def reduce_zones(
     distances: Array,
@@ -138,6 +66,8 @@ def reduce_zones(
     found: Array,
     away: Array,
     zones: Index,
+    around: Array,
+    among: Index,
     carrier: int,
     each: int,
     stride: int,
@@ -156,7 +86,8 @@ def reduce_zones(
         starts, ends: Of the robot's wire now (links, 3).
         poses: Of the robot's bodies when the image was taken (b, 4, 4).
         bodies, first, planes, balls: The robot itself and known obstacles, see `HullSet.tables`.
-        found, away, zones: To work in: (z, 4), (links, z), (z,).
+        found, away, zones, around, among: To work in: (z, 4), (links, z), (z,), and for k known things (k, `AROUND`),
+            (2, k).
         carrier: The robot's body that the sensor sits on; -1 for none.
         each: How many points a link keeps.
         stride: Of so many zones one is asked whether it sees through what is known.
@@ -170,6 +101,8 @@ def reduce_zones(
     links, reach = starts.shape[0], numbers[REACH] * numbers[REACH]
     shown[:] = 0
     n = 0
+    count, some = look_around(o, pose, numbers, carrier, poses, bodies, balls, around, among)
+    mine, every = among[0, :some], among[1, :count]
     for i in range(distances.shape[0]):
         d = distances[i]
         if not valid[i] or d != d:
@@ -182,7 +115,9 @@ def reduce_zones(
         wrong = numbers[DEVIATIONS] * sigma[i]
         fat = numbers[TOLERANCE] + wrong
         if i % stride == 0:
-            surface = blocked(o, a, slants[i], fat, numbers[FARTHEST], carrier, poses, bodies, first, planes, balls)
+            surface = blocked(
+                a, slants[i], fat, numbers[FARTHEST], around, mine, every, poses, bodies, first, planes, balls
+            )
             if surface < inf:
                 shown[EXPECTED] += 1
                 if d > surface:

@@ -65,7 +65,7 @@ def run_finals(
     total, done = encounters * len(named), sum(min(len(kept.finals.get(t.number, ())), encounters) for t in named)
     told = _told(progress, done, total)
     with crew_at_work(executor, workers) as crew:
-        hall = Hall(search, search.space(), crew, play, notice)
+        hall = Hall(search.plan, search.rungs, search.space(), crew, play, notice)
         for at in range(0, len(named), TOGETHER):
             some = named[at : at + TOGETHER]
             first = min(len(kept.finals.get(trial.number, ())) for trial in some)

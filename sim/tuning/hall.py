@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from qpsafe.sim.campaign.executors import Crew, answers
 from qpsafe.sim.tuning.front import Objectives, ranks
@@ -17,7 +17,6 @@ from qpsafe.sim.tuning.trial import Trial, front_of
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.tuning.search import Search
 
 #: Servo lags that values must be steady with, in ticks: 8 and 20 ms.
 LAGS = (2, 5)
@@ -25,11 +24,26 @@ LAGS = (2, 5)
 SIZE = 6
 
 
+class Rungs(NamedTuple):
+    """How far values are played.
+
+    Attributes:
+        encounters: Of each rung, all encounters last; multiples of the number of motions treat these alike.
+        goes_on: Share of a batch that goes on after each rung but the last.
+        lagged: Encounters with each of `LAGS`, on the last rung.
+    """
+
+    encounters: tuple[int, ...] = (24, 72, 216)
+    goes_on: tuple[float, ...] = (0.375, 0.125)
+    lagged: int = 12
+
+
 class Hall:
     """Where values meet encounters.
 
     Args:
-        search: What is searched.
+        plan: Of the search.
+        rungs: How far values are played.
         space: Around the present values.
         crew: Who plays.
         play: Plays a piece; by default `qpsafe.sim.tuning.play.play_piece`.
@@ -38,13 +52,15 @@ class Hall:
 
     def __init__(
         self,
-        search: Search,
+        plan: Plan,
+        rungs: Rungs,
         space: Space,
         crew: Crew,
         play: PieceFunction | None,
         notice: Callable[[str], None] | None,
     ) -> None:
-        self._search, self._space, self._crew, self._notice = search, space, crew, notice
+        self._plan, self._rungs, self._space = plan, rungs, space
+        self._crew, self._notice = crew, notice
         self._play, self._seconds = partial(timed, play or play_piece), 0.0
 
     def spent(self) -> float:
@@ -54,7 +70,7 @@ class Hall:
 
     def whole(self, point: Point) -> Played:
         """A point in all encounters, and with all lags."""
-        plan, rungs = self._search.plan, self._search.rungs
+        plan, rungs = self._plan, self._rungs
         (plain,) = self.runs(plan, range(rungs.encounters[-1]), [point])
         return {0: plain} | {lag: self._lagged(lag, [point])[0] for lag in LAGS}
 
@@ -66,7 +82,7 @@ class Hall:
             kept: The trials before.
         """
         assert kept.reference is not None
-        rungs, plan = self._search.rungs, self._search.plan
+        rungs, plan = self._rungs, self._plan
         played: list[Played] = [{0: []} for _ in points]
         going, done = list(range(len(points))), 0
         for level, count in enumerate(rungs.encounters):
@@ -86,7 +102,7 @@ class Hall:
         ]
 
     def _lagged(self, lag: int, points: Sequence[Point]) -> list[list[Outcome]]:
-        return self.runs(lagged(self._search.plan, lag), range(self._search.rungs.lagged), points)
+        return self.runs(lagged(self._plan, lag), range(self._rungs.lagged), points)
 
     def runs(
         self, plan: Plan, encounters: range, points: Sequence[Point], heard: Callable[[int], None] | None = None

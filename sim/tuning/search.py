@@ -10,13 +10,13 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from time import monotonic
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.campaign.executors import crew_at_work
 from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
-from qpsafe.sim.tuning.hall import LAGS, Hall
+from qpsafe.sim.tuning.hall import LAGS, Hall, Rungs
 from qpsafe.sim.tuning.journal import Journal
 from qpsafe.sim.tuning.objectives import score
 from qpsafe.sim.tuning.play import PieceFunction
@@ -32,20 +32,6 @@ if TYPE_CHECKING:
 #: judgement. Campaigns have those below.
 SEARCH, JUDGE, APART, MOST = 7_000_000, 8_000_000, 10_000, 99
 TRIALS = 400
-
-
-class Rungs(NamedTuple):
-    """How far values are played.
-
-    Attributes:
-        encounters: Of each rung, all encounters last; multiples of the number of motions treat these alike.
-        goes_on: Share of a batch that goes on after each rung but the last.
-        lagged: Encounters with each of `LAGS`, on the last rung.
-    """
-
-    encounters: tuple[int, ...] = (24, 72, 216)
-    goes_on: tuple[float, ...] = (0.375, 0.125)
-    lagged: int = 12
 
 
 @dataclass(frozen=True)
@@ -117,7 +103,7 @@ def run_search(
     begun, space = monotonic(), search.space()
     kept = Journal(journal, search.identity())
     with crew_at_work(executor, workers) as crew:
-        hall = Hall(search, space, crew, play, notice)
+        hall = Hall(search.plan, search.rungs, space, crew, play, notice)
         if progress is not None:
             progress(len(kept.trials), kept)
         while len(kept.trials) < trials:

@@ -16,6 +16,7 @@ nothing that rings; what accelerates by a is at most a window/2 faster than is s
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -23,7 +24,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
-from qpsafe.ranging.tracking.tracks_kernel import IMAGES, swept, track
+from qpsafe.ranging.tracking.tracks_kernel import IMAGES, sizes, swept, track
+
+_FLOAT = np.dtype(np.float64)
+
+
+@dataclass(slots=True)
+class _Ring:
+    """Where the next image goes, how many there are, the stamp of the last one, and of the last that has a place."""
+
+    slot: int = 0
+    filled: int = 0
+    stamp: float = -np.inf
+    kept: float = -np.inf
 
 
 class PointTracks(Fixed):
@@ -60,17 +73,13 @@ class PointTracks(Fixed):
                 raise ConfigurationError("PointTracks", key, value, f"a number >= {least:g}")
         self.most = int(most)
         self.numbers = np.array([reach, window, fastest, still, slope])
-        n, k = self.most, IMAGES
-        self._places, self._motions = np.zeros((k, n, 3)), np.zeros((k, n, 7))
-        self._names, self._counts = np.zeros((k, 2, n), dtype=np.int64), np.zeros((k, 2), dtype=np.int64)
-        self._stamps = np.zeros(k)
-        self._work, self._seen = np.zeros((2, n, 3)), np.zeros((2 * n, 3))
-        self._vectors, self._stack = np.zeros((6, n)), np.zeros(n, dtype=np.int64)
+        floats, whole = sizes(self.most)
+        self._memory = np.zeros(floats), np.zeros(whole, dtype=np.int64)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        self._slot, self._filled, self._stamp, self._kept = 0, 0, -np.inf, -np.inf
+        self._ring = _Ring()
 
     def update(
         self, stamp: float, points: NDArray[np.float64], sigma: ArrayLike = 0.01, sweep: ArrayLike = 0.0
@@ -88,26 +97,25 @@ class PointTracks(Fixed):
             sweep: How fast the sensor's own motion moves its rays aside there, (p,) or one number [m/s], see `sweep`.
         """
         velocities = np.zeros((len(points), 3))
-        if not (stamp > self._stamp and stamp < np.inf):
+        ring = self._ring
+        if not (stamp > ring.stamp and stamp < np.inf):
             return velocities
         # images that follow one another fast replace each other, so that a window of them finds room
-        replaces = self._filled > 0 and stamp - self._kept < self.numbers[1] / (IMAGES - 4)
+        replaces = ring.filled > 0 and stamp - ring.kept < self.numbers[1] / (IMAGES - 4)
         if not replaces:
-            self._slot, self._filled = (self._slot + 1) % IMAGES, min(self._filled + 1, IMAGES)
-            self._kept = stamp
+            ring.slot, ring.filled = (ring.slot + 1) % IMAGES, min(ring.filled + 1, IMAGES)
+            ring.kept = stamp
         spread, aside = _each(sigma, len(points)), _each(sweep, len(points))
-        self._stamp = stamp
+        ring.stamp = stamp
         track(
-            points, spread, aside, stamp, self.numbers, self._slot, self._filled - 1,
-            self._places, self._motions, self._names, self._counts, self._stamps,
-            self._work, self._seen, self._vectors, self._stack, velocities,
-        )  # fmt: skip
+            points, spread, aside, stamp, self.numbers, self.most, ring.slot, ring.filled - 1, *self._memory, velocities
+        )
         return velocities
 
 
 def _each(value: ArrayLike, count: int) -> NDArray[np.float64]:
-    """One number for each point, or the caller's own array."""
-    if isinstance(value, np.ndarray) and value.shape == (count,):
+    """A number for each point, or one for all of them: the caller's own array if it may be."""
+    if type(value) is np.ndarray and value.dtype == _FLOAT and value.shape in ((count,), (1,)):
         return value
     return np.full(count, value, dtype=np.float64)
 

@@ -7,6 +7,7 @@ from math import isfinite, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, entry, inline, readable
+from qpsafe.compiled.memory import view
 from qpsafe.ranging.tracking import clusters as clusters_module
 from qpsafe.ranging.tracking.clusters import best_shift, certain_part, gather, is_there, join, parent_of, squared
 from qpsafe.robot.kinematics import Index
@@ -34,38 +35,47 @@ def _others(points: Array, here: Array, number: Array, count: int, reach: float,
             velocities[i, c] = velocities[int(number[k]), c] if k >= 0 else 0.0
 
 
+def sizes(most: int) -> tuple[int, int]:
+    """How many floats and whole numbers `track` remembers images of so many points in."""
+    return (10 * most + 1) * IMAGES + 18 * most, 2 * IMAGES * (most + 1) + most
+
+
 _floats, _whole = types.float64, types.int64
 
 
 @entry(
     _whole(
-        readable(2), readable(1), readable(1), _floats, readable(1), _whole, _whole,
-        _floats[:, :, ::1], _floats[:, :, ::1], _whole[:, :, ::1], _whole[:, ::1], _floats[::1],
-        _floats[:, :, ::1], _floats[:, ::1], _floats[:, ::1], _whole[::1], _floats[:, ::1],
+        readable(2), readable(1), readable(1), _floats, readable(1), _whole, _whole, _whole,
+        _floats[::1], _whole[::1], _floats[:, ::1],
     ),
     clusters_module,
 )  # fmt: skip
 def track(
-    points: Array, sigma: Array, sweep: Array, stamp: float, numbers: Array, slot: int, filled: int,
-    places: Array, motions: Array, names: Index, counts: Index, stamps: Array,
-    work: Array, seen: Array, vectors: Array, stack: Index, velocities: Array,
+    points: Array, sigma: Array, sweep: Array, stamp: float, numbers: Array, most: int, slot: int, filled: int,
+    memory: Array, marks: Index, velocities: Array,
 ) -> int:  # fmt: skip
     """Fill velocities (p, 3) of the points of an image, and remember it.
 
     Args:
-        points, sigma, sweep, stamp: Of the image, (p, 3), (p,), (p,).
+        points, sigma, sweep, stamp: Of the image, (p, 3), (p,), (p,); one number in place of p where all are alike.
         numbers: See above.
+        most: n, of how many points images are remembered.
         slot, filled: Where the image is remembered; how many before it are.
-        places, motions, names, counts, stamps: Of the remembered images: points (k, n, 3); velocity, sweep and certain
-            velocity of each cluster (k, n, 7); cluster of each point, and parent of each cluster (k, 2, n); how many
-            points and clusters (k, 2).
-        work, seen, vectors, stack: To work in, (2, n, 3), (2 n, 3), (6, n), (n,).
+        memory, marks: Of the remembered images, zeros at first, as many as `sizes` tells.
         velocities: (p, 3) [m/s], zero where none is known.
 
     Returns:
         How many clusters there are.
     """  # fmt: skip
-    most, images = places.shape[1], places.shape[0]
+    images, n = IMAGES, most
+    # points; velocity, sweep and certain velocity of each cluster; stamps; to work in
+    places, motions = view(memory, 0, (images, n, 3)), view(memory, 3 * images * n, (images, n, 7))
+    stamps, free = view(memory, 10 * images * n, (images,)), (10 * n + 1) * images
+    work, seen = view(memory, free, (2, n, 3)), view(memory, free + 6 * n, (2 * n, 3))
+    vectors = view(memory, free + 12 * n, (6, n))
+    # cluster of each point, and parent of each cluster; how many points and clusters; to work in
+    names, counts = view(marks, 0, (images, 2, n)), view(marks, 2 * images * n, (images, 2))
+    stack = view(marks, 2 * images * (n + 1), (n,))
     reach, window, fastest = numbers[REACH], numbers[WINDOW], numbers[FASTEST]
     here, labels, count = places[slot], names[slot, 0], 0
     number = vectors[5]  # of each remembered point in the image
@@ -87,7 +97,8 @@ def track(
         for i in range(count):
             if labels[i] == cluster:
                 k = int(number[i])
-                swept, noise = max(swept, sweep[k]), noise + 2.0 * sigma[k] * sigma[k] / m
+                one = sigma[min(k, sigma.shape[0] - 1)]
+                swept, noise = max(swept, sweep[min(k, sweep.shape[0] - 1)]), noise + 2.0 * one * one / m
         parent = -1
         if recent:
             parent = parent_of(

@@ -12,6 +12,9 @@ Array = NDArray[np.float64]
 MOST = 96  # points of an image that are tracked
 
 
+_ASIDE = np.zeros(1)  # a sensor that stands still
+
+
 class Velocities:
     """Velocities of what one sensor sees.
 
@@ -20,7 +23,7 @@ class Velocities:
     """
 
     def __init__(self, sigma: float) -> None:
-        self._tracks, self._sigma = PointTracks(most=MOST), sigma
+        self._tracks, self._sigma = PointTracks(most=MOST), np.array([sigma], dtype=np.float64)
         self.reset()
 
     def reset(self) -> None:
@@ -37,7 +40,7 @@ class Velocities:
             points: That it shows (p, 3) [m].
             pose: Of a sensor that the robot carries (4, 4); None for one that is fixed.
         """
-        aside: Array | float = 0.0
+        aside = _ASIDE
         if pose is not None and self._pose is not None and stamp > self._stamp:
             aside = sweep(points, self._pose, pose, stamp - self._stamp)
         self._pose, self._stamp = pose, stamp
