@@ -194,7 +194,33 @@ def tuned_values() -> str:
     return "\n".join(rows)
 
 
+def floor() -> str:
+    """What is left where everybody is seen: shares of encounters, then the contacts by the part that is touched."""
+    found = measured("perfect-sight")
+    shares = (
+        ("without control, touched", "without"), ("the default controller, touched", "contacts"),
+        ("touched while it moves", "moving"), ("while it moves towards the person", "towards"),
+        ("touched, and no motion without contact was found", "left"),
+    )  # fmt: skip
+    rows = [
+        f"| of {found['encounters']} encounters, everybody seen | trials | % (limits at 95 %) |",
+        "| --- | --- | --- |",
+    ]
+    for words, key in shares:
+        one = found[key]
+        rows.append(f"| {words} | {one['hits']} | {100 * one['value']:.1f} ({_limits(one)}) |")
+    heads = ("touched part of the robot", "contacts", "at rest", "a motion without was found", "surely none")
+    rows += ["", f"| {' | '.join(heads)} |", "|" + " --- |" * len(heads)]
+    rows += [f"| `{name}` | {' | '.join(str(n) for n in part.values())} |" for name, part in found["parts"].items()]
+    return "\n".join(rows)
+
+
+def _limits(share: dict[str, Any]) -> str:
+    return f"{100 * share['low']:.1f} to {100 * share['high']:.1f}"
+
+
 TABLES = {
+    "floor": floor,
     "judged": judged,
     "tuned": tuned,
     "tuned-values": tuned_values,

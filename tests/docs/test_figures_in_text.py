@@ -118,7 +118,10 @@ def campaign() -> list[str]:
     found = measured("campaign")
     done, planned = (found["trials"][key] * len(found["controllers"]) for key in ("finished", "planned"))
     hours = found["engine"]["processes_s"] / 3600
+    seen = measured("perfect-sight")
+    low = sum(seen["parts"].get(part, {"contacts": 0})["contacts"] for part in ("joint_1", "joint_2", "base"))
     return [
+        f"{seen['hands']} of the {seen['contacts']['hits']} touch with a hand, and {low} at the turntable",
         f"planned for {found['trials']['planned']:,} trials, {planned:,} runs",
         f"after {done:,} runs, which took {hours:.1f} hours of processor time",
     ]
