@@ -17,6 +17,8 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from qpsafe.errors import QpsafeError
+from qpsafe.extras import require
+from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.rows import Columns, columns_of, joined
@@ -101,37 +103,40 @@ def run_campaign(
     Raises:
         TrialError: A trial could not be played.
         WorkerDiedError: A process died twice of the same trials.
-        ConfigurationError: The folder holds another campaign.
+        ConfigurationError: The folder holds another campaign, or another process is at work there.
         MissingExtraError: pyarrow is not installed, and there is a folder.
     """
     begun = perf_counter()
     play = partial(play_trials, trial or _engine(), plan)
-    store = None if out is None else Store(out, plan)
-    finished = set() if store is None else store.trials() & set(range(plan.trials))
-    parts: list[Played] = []
-    count, kept = len(finished), perf_counter()
-    if progress is not None:
-        progress(count, plan.trials)
-    with crew_at_work(executor, workers) as crew:
-        try:
-            with closing(answers(crew, play, _pieces(plan.trials, finished), notice)) as found:
-                for part in found:
-                    parts.append(part)
-                    count += len(part.columns["trial"]) // len(plan.controllers)
-                    if progress is not None:
-                        progress(count, plan.trials)
-                    full = CHUNK * len(parts) >= KEEP_MOST or perf_counter() - kept >= keep_every
-                    if store is not None and full:
-                        store.keep(parts)
-                        parts.clear()
-                        kept = perf_counter()
-        finally:
-            if store is not None:
-                store.keep(parts)
-    if store is None:
-        whole = Played(joined([p.columns for p in parts], plan.controllers), sum(p.seconds for p in parts))
-    else:
-        whole = store.read()
+    if out is not None:
+        require("campaign", "a folder of trials", "pyarrow")  # before one is made
+    with alone_in(out):
+        store = None if out is None else Store(out, plan)
+        finished = set() if store is None else store.trials() & set(range(plan.trials))
+        parts: list[Played] = []
+        count, kept = len(finished), perf_counter()
+        if progress is not None:
+            progress(count, plan.trials)
+        with crew_at_work(executor, workers) as crew:
+            try:
+                with closing(answers(crew, play, _pieces(plan.trials, finished), notice)) as found:
+                    for part in found:
+                        parts.append(part)
+                        count += len(part.columns["trial"]) // len(plan.controllers)
+                        if progress is not None:
+                            progress(count, plan.trials)
+                        full = CHUNK * len(parts) >= KEEP_MOST or perf_counter() - kept >= keep_every
+                        if store is not None and full:
+                            store.keep(parts)
+                            parts.clear()
+                            kept = perf_counter()
+            finally:
+                if store is not None:
+                    store.keep(parts)
+        if store is None:
+            whole = Played(joined([p.columns for p in parts], plan.controllers), sum(p.seconds for p in parts))
+        else:
+            whole = store.read()
     return Results(plan, whole.columns, whole.seconds, perf_counter() - begun, versions())
 
 

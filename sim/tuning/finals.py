@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import crew_at_work
 from qpsafe.sim.tuning.hall import Hall, promising
 from qpsafe.sim.tuning.journal import Journal
@@ -55,7 +56,7 @@ def run_finals(
         values if nothing else keeps the constraints.
 
     Raises:
-        ConfigurationError: There are not that many encounters.
+        ConfigurationError: There are not that many encounters, or another process is at work in the journal's folder.
         WorkerDiedError: A process died twice of the same piece.
     """
     if not 1 <= encounters <= MOST:
@@ -64,7 +65,7 @@ def run_finals(
     named = [kept.trials[0], *finalists(kept.trials)]
     total, done = encounters * len(named), sum(min(len(kept.finals.get(t.number, ())), encounters) for t in named)
     told = _told(progress, done, total)
-    with crew_at_work(executor, workers) as crew:
+    with alone_in(kept.folder), crew_at_work(executor, workers) as crew:
         hall = Hall(search.plan, search.rungs, search.space(), crew, play, notice)
         for at in range(0, len(named), TOGETHER):
             some = named[at : at + TOGETHER]

@@ -62,6 +62,11 @@ class Journal:
             self._take(_parsed(path, line))
 
     @property
+    def folder(self) -> Path | None:
+        """Where the file lies; None for none."""
+        return None if self._path is None else self._path.parent
+
+    @property
     def batches(self) -> int:
         """How many are finished, with that of the present values."""
         return 1 + max((trial.batch for trial in self.trials), default=-1)

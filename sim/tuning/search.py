@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
+from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import crew_at_work
 from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
 from qpsafe.sim.tuning.hall import LAGS, Hall, Rungs
@@ -96,26 +97,27 @@ def run_search(
         notice: Told in words when a process has died.
 
     Raises:
-        ConfigurationError: The journal is of another search.
+        ConfigurationError: The journal is of another search, or another process is at work in its folder.
         WorkerDiedError: A process died twice of the same piece.
         MissingExtraError: optuna is not installed.
     """
     begun, space = monotonic(), search.space()
-    kept = Journal(journal, search.identity())
-    with crew_at_work(executor, workers) as crew:
-        hall = Hall(search.plan, search.rungs, space, crew, play, notice)
-        if progress is not None:
-            progress(len(kept.trials), kept)
-        while len(kept.trials) < trials:
-            if kept.trials and minutes is not None and monotonic() - begun >= 60.0 * minutes:
-                break
-            if kept.reference is None:
-                reference = hall.whole(space.start)
-                first = Trial(0, 0, space.start, search.plan.trials, True, score(reference, reference))
-                kept.keep([first], hall.spent(), reference)
-            else:
-                points = ask(space, kept.trials, search.seed, kept.batches)
-                kept.keep(hall.batch(points, kept), hall.spent())
+    with alone_in(None if journal is None else journal.parent):
+        kept = Journal(journal, search.identity())
+        with crew_at_work(executor, workers) as crew:
+            hall = Hall(search.plan, search.rungs, space, crew, play, notice)
             if progress is not None:
                 progress(len(kept.trials), kept)
+            while len(kept.trials) < trials:
+                if kept.trials and minutes is not None and monotonic() - begun >= 60.0 * minutes:
+                    break
+                if kept.reference is None:
+                    reference = hall.whole(space.start)
+                    first = Trial(0, 0, space.start, search.plan.trials, True, score(reference, reference))
+                    kept.keep([first], hall.spent(), reference)
+                else:
+                    points = ask(space, kept.trials, search.seed, kept.batches)
+                    kept.keep(hall.batch(points, kept), hall.spent())
+                if progress is not None:
+                    progress(len(kept.trials), kept)
     return kept

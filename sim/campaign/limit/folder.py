@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.limit.row import Limit, limit_from
 from qpsafe.sim.campaign.limit.search import EVALUATIONS
@@ -53,7 +54,7 @@ def limits_of(
 
     Raises:
         ConfigurationError: It is no folder of a campaign, or one of other code, it does not have the controller, or
-            limits of another search.
+            limits of another search; or another process is at work there.
         MissingExtraError: pyarrow or cma is not installed.
         WorkerDiedError: A process died twice of the same trial.
     """
@@ -61,28 +62,29 @@ def limits_of(
     plan = results.plan
     if controller not in plan.controllers:
         raise ConfigurationError(folder, "controller", controller, f"one of {', '.join(plan.controllers)}")
-    Store(folder, plan)  # refuses a folder of other code: its trials would not be met again
-    wanted = _contacts(results, controller)
-    file, head = _file(folder, controller), _head(results, controller, evaluations)
-    found = {item.trial: item for item in _read(file, head)} if file.exists() else {}
-    _write(file, head, found.values())
-    todo = [trial for trial in wanted if trial not in found]
-    search, done = partial(_one, limit or _limit, plan, controller, evaluations), len(wanted) - len(todo)
-    if progress is not None:
-        progress(done, len(wanted))
-    with (
-        crew_at_work(executor, workers) as crew,
-        file.open("a", encoding="utf-8") as kept,
-        closing(answers(crew, search, todo)) as answered,
-    ):
-        for item in answered:
-            found[item.trial] = item
-            kept.write(_line(item._asdict()))
-            kept.flush()
-            done += 1
-            if progress is not None:
-                progress(done, len(wanted))
-    _write(file, head, found.values())  # in order: the same file whoever searched
+    with alone_in(folder):
+        Store(folder, plan)  # refuses a folder of other code: its trials would not be met again
+        wanted = _contacts(results, controller)
+        file, head = _file(folder, controller), _head(results, controller, evaluations)
+        found = {item.trial: item for item in _read(file, head)} if file.exists() else {}
+        _write(file, head, found.values())
+        todo = [trial for trial in wanted if trial not in found]
+        search, done = partial(_one, limit or _limit, plan, controller, evaluations), len(wanted) - len(todo)
+        if progress is not None:
+            progress(done, len(wanted))
+        with (
+            crew_at_work(executor, workers) as crew,
+            file.open("a", encoding="utf-8") as kept,
+            closing(answers(crew, search, todo)) as answered,
+        ):
+            for item in answered:
+                found[item.trial] = item
+                kept.write(_line(item._asdict()))
+                kept.flush()
+                done += 1
+                if progress is not None:
+                    progress(done, len(wanted))
+        _write(file, head, found.values())  # in order: the same file whoever searched
     return tuple(found[trial] for trial in wanted)
 
 
