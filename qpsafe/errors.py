@@ -7,6 +7,8 @@ and what was expected.
 
 from __future__ import annotations
 
+from typing import Any
+
 _LONGEST = 1000  # letters of a message in the loop
 _LONGEST_VALUE = 400  # of a value in it
 
@@ -57,6 +59,10 @@ class ConfigurationError(QpsafeError, ValueError):
         self.value = value
         self.expected = expected
         super().__init__(f"{self.where}: {key} = {_shown(value)}: expected {expected}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """All arguments, so that an error in a worker process arrives as it is; else the whole pool would break."""
+        return type(self), (self.where, self.key, self.value, self.expected)
 
 
 def _shown(value: object) -> str:

@@ -53,9 +53,13 @@ def place(
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
     radius: Annotated[
         float | None,
-        typer.Option(help="Largest distance of people from the base axis [m]; by default the robot's reach."),
+        typer.Option(
+            min=0.1, max=10.0, help="Largest distance of people from the base axis [m]; by default the robot's reach."
+        ),
     ] = None,
-    pedestal: Annotated[float, typer.Option(help="Height of the robot's base above the floor [m].")] = 0.55,
+    pedestal: Annotated[
+        float, typer.Option(min=0.05, max=2.0, help="Height of the robot's base above the floor [m].")
+    ] = 0.55,
     workers: Annotated[
         int, typer.Option(min=0, help="Number of processes; 0: one per processor, 1: this process only.")
     ] = 1,

@@ -70,7 +70,7 @@ def stream(
     ] = "127.0.0.1:6512",
     duration: Annotated[float | None, typer.Option(min=0.1, help="Stop after streaming for this long [s].")] = None,
     patience: Annotated[
-        float, typer.Option(min=0.0, help="Stop after this silence of the robot [s]; 0: never.")
+        float, typer.Option(min=0.0, help="Stop after this silence of a robot that was answered [s]; 0: never.")
     ] = 15.0,
     ramp_in: Annotated[
         float, typer.Option(min=0.01, max=10.0, help="Time to blend in from the measured pose [s].")

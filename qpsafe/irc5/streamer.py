@@ -43,7 +43,7 @@ class EgmStreamer:
             are taken; the default is for simulated robots on this computer.
         port: The robot's configuration has it; 0 for any free one.
         rules: How to ramp, and what counts as wrong.
-        peer: Address of the robot; by default that of the first valid packet.
+        peer: Address of the robot, or its name; by default the address of the first valid packet.
         joint_names: For the reports.
         axes: Which joints are external; by default those from the seventh on.
 
@@ -55,7 +55,8 @@ class EgmStreamer:
             The newest is answered, but a delay in which several came must show in full.
 
     Raises:
-        ConfigurationError: The host is unknown here, or stands for all interfaces; the port is no port, or is taken.
+        ConfigurationError: The host is unknown here, or stands for all interfaces; the port is no port, or is taken;
+            the peer has no address.
     """
 
     def __init__(
@@ -68,7 +69,8 @@ class EgmStreamer:
         joint_names: Sequence[str] | None = None,
         axes: Axes | None = None,
     ) -> None:
-        self.session = EgmSession(limits, rules, peer, joint_names, axes)
+        known = None if peer is None else peer_address(peer)
+        self.session = EgmSession(limits, rules, known, joint_names, axes)
         if not (isinstance(port, int) and 0 <= port < 65536):
             raise ConfigurationError("EgmStreamer", "port", port, "a UDP port, 0 to 65535")
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -206,10 +208,30 @@ def interface_address(host: str) -> str:
                     "EgmStreamer", "host", host, f"an interface with an address ({error})"
                 ) from None
         return socket.inet_ntoa(answer[20:24])
-    try:
-        address = socket.gethostbyname(host) if host else "0.0.0.0"
-    except (OSError, UnicodeError):
-        address = ""
-    if address in ("", "0.0.0.0", "255.255.255.255"):
+    address = _found(host)
+    if address is None:
         raise ConfigurationError("EgmStreamer", "host", host, expected + ", ".join(names))
     return address
+
+
+def peer_address(peer: str) -> str:
+    """The IPv4 address of a host name or address, as packets from there bear it.
+
+    Raises:
+        ConfigurationError: There is none, or it is that of nobody: all packets would be a stranger's.
+    """
+    address = _found(peer)
+    if address is None:
+        raise ConfigurationError(
+            "EgmStreamer", "peer", peer, "the robot's IPv4 address, e.g. 192.168.125.1, or its name"
+        )
+    return address
+
+
+def _found(name: str) -> str | None:
+    """The IPv4 address of a name or an address; None where there is none, or one of nobody or everybody."""
+    try:
+        address = socket.gethostbyname(name) if name else "0.0.0.0"
+    except (OSError, UnicodeError):
+        return None
+    return None if address in ("0.0.0.0", "255.255.255.255") else address

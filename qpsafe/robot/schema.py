@@ -27,6 +27,7 @@ from qpsafe.robot.parameter_tables import (
     SensingTable,
     Table,
 )
+from qpsafe.text.complaints import expected_words
 from qpsafe.text.toml_parse import read_bounded, toml_table
 from qpsafe.text.words import counted
 
@@ -283,12 +284,5 @@ def _named_error(path: Path, error: pydantic.ValidationError, raw: dict[str, Any
     if len(parts) > 1 and isinstance(raw.get(str(parts[0])), dict) and parts[1] == 0:
         del parts[1]  # the only one of tables of which there may be several
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
-    value: Any = first["input"]
-    expected = first["msg"].removeprefix("Input should be ")
-    if first["type"] == "missing":
-        value, expected = None, "a value: this key is missing"
-    elif first["type"] == "extra_forbidden":
-        expected = "no such key (misspelt, or in the wrong table?)"
-    elif first["type"] == "literal_error":
-        expected = first["ctx"]["expected"]
-    return RobotFileError(path, key, value, expected)
+    value: Any = None if first["type"] == "missing" else first["input"]
+    return RobotFileError(path, key, value, expected_words(first))

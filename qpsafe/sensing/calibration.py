@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.sensing.sharp import SharpConverter, SharpCurve
+from qpsafe.text.complaints import expected_words
 from qpsafe.text.toml_parse import read_bounded, toml_table
 from qpsafe.text.words import counted
 
@@ -210,7 +211,7 @@ def read_calibration(path: Path) -> dict[str, SharpCurve]:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise RobotFileError(path, key, first.get("input"), first["msg"]) from None
+        raise RobotFileError(path, key, first.get("input"), expected_words(first)) from None
     except (OSError, ValueError) as error:
         raise RobotFileError(path, "file", path.name, f"a readable TOML file ({error})") from None
     curves: dict[str, SharpCurve] = {}

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from qpsafe.errors import RobotFileError
 from qpsafe.sensing.body import body_hull_set
 from qpsafe.sensing.spot import Spot, axes_along
+from qpsafe.text.complaints import expected_words
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def _parse(path: Path, kind: type[_File]) -> _File:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise RobotFileError(path, key, first.get("input"), first["msg"]) from None
+        raise RobotFileError(path, key, first.get("input"), expected_words(first)) from None
 
 
 def _spot(path: Path, key: str, table: SpotTable, file: SpotFile, robot: Robot) -> Spot:

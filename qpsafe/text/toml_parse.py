@@ -32,7 +32,11 @@ def read_bounded(path: Path) -> str:
         content = file.read(LARGEST + 1)
     if len(content) > LARGEST:
         raise ValueError(f"it is larger than {LARGEST:,} bytes")
-    return content.decode("utf-8")
+    try:
+        return content.decode("utf-8-sig")  # some editors begin a file with a mark that nobody sees
+    except UnicodeDecodeError as problem:
+        line = content.count(b"\n", 0, problem.start) + 1
+        raise ValueError(f"it is not in UTF-8, in line {line}: {problem.reason}") from None
 
 
 def toml_table(text: str) -> dict[str, Any]:
@@ -48,7 +52,7 @@ def toml_table(text: str) -> dict[str, Any]:
         line = text.count("\n", 0, long.start()) + 1
         raise tomllib.TOMLDecodeError(f"A key of more than {DEEPEST} parts (at line {line})")
     try:
-        table = tomllib.loads(text)
+        table = tomllib.loads(text.removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError:
         raise
     except RecursionError:

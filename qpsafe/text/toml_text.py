@@ -11,6 +11,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.complaints import expected_words
 from qpsafe.text.lines import line_of
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
@@ -70,7 +71,10 @@ class TomlText:
                 if is_key(keys, part):
                     keys.append(part)
             value = "nothing" if first["type"] == "missing" else first["input"]
-            raise self.wrong(keys, value, first["msg"]) from None
+            if first["type"] in ("union_tag_invalid", "union_tag_not_found"):  # the key that says which kind it is
+                keys.append(first["ctx"]["discriminator"].strip("'"))
+                value = first["ctx"].get("tag", "nothing")
+            raise self.wrong(keys, value, expected_words(first)) from None
 
     def wrong(self, keys: Keys, value: object, expected: str) -> ConfigurationError:
         """An error about the value of a key such as ``("segment", 2, "to")``, of the text's kind.

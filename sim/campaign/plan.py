@@ -24,6 +24,7 @@ import qpsafe.robots
 import qpsafe.sim
 import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
+from qpsafe.robot.loader import find_robot
 from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.ranging.sets import sensor_kinds
 from qpsafe.text.json_text import json_text
@@ -183,6 +184,10 @@ def parse_plan(text: TomlText, folder: Path = Path()) -> Plan:
             tables[key] = str(folder / tables[key])
     if (folder / said.robot).exists():
         tables["robot"] = str(folder / said.robot)
+    try:
+        find_robot(tables["robot"])
+    except ConfigurationError as wrong:
+        raise text.wrong(["robot"], said.robot, wrong.expected) from None
     try:
         return Plan(**tables)
     except ConfigurationError as wrong:

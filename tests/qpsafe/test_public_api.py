@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import json
+import pickle
 import subprocess
 import sys
 from typing import Any
@@ -195,3 +196,18 @@ def test_errors_are_one_family() -> None:
     assert issubclass(qpsafe.ConfigurationError, ValueError)
     error = qpsafe.ConfigurationError("a.toml", "key", 3, "a number < 2")
     assert str(error) == "a.toml: key = 3: expected a number < 2"
+
+
+def kinds_of(error: type[qpsafe.QpsafeError]) -> list[type[qpsafe.QpsafeError]]:
+    return [error, *(kind for child in error.__subclasses__() for kind in kinds_of(child))]
+
+
+def test_errors_come_out_of_another_process_as_they_went_in() -> None:
+    """Of every kind; one that cannot be unpickled would break the pool, which looks as if a process had died."""
+    for name in ("tasks.program_file", "sim.stories.file", "sim.stories.planning", "sim.campaign.runner"):
+        importlib.import_module(f"qpsafe.{name}")
+    for kind in kinds_of(qpsafe.QpsafeError):
+        code = getattr(kind.__init__, "__code__", None)  # none of those that take but a text
+        error = kind(*(["said"] if code is None else [0, ["a", 3], "c", "d"][: code.co_argcount - 1]))
+        there = pickle.loads(pickle.dumps(error))
+        assert (type(there), str(there), vars(there)) == (kind, str(error), vars(error))

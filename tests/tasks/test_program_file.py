@@ -114,7 +114,7 @@ MISTAKES = {
     "unknown start": ('start = "rest"', 'start = "bed"', 3, "start"),
     "no speed": ("speed = 0.2", "speed = 0.0", 6, "rates.speed"),
     "infinite speed": ("speed = 0.05", "speed = inf", LINE + 2, "segment[1].speed"),
-    "unknown kind": ('do = "line"', 'do = "fly"', LINE - 1, "segment[1]"),
+    "unknown kind": ('do = "line"', 'do = "fly"', LINE, "segment[1].do"),
     "unknown point": ('to = "pick"', 'to = "peck"', LINE + 1, "segment[1].to"),
     "unknown frame": ("cycle = true", 'frame = "tip"', 2, "frame"),
     "too few joints": ("0.0, 85.0, 0.0]", "85.0]", 9, "points.rest.joints"),

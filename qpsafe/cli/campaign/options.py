@@ -102,7 +102,25 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
     if load_robot(made.robot).spots_path is None:
         expected = "a robot with distance sensors (spots.toml)"
         raise ConfigurationError(where, "--robot", made.robot, expected)
+    _read_files(made)
     return made
+
+
+def _read_files(plan: Plan) -> None:
+    """Read the files that a plan names: what is wrong in them is said before anything begins."""
+    from qpsafe.sensing.cell_file import load_cell
+    from qpsafe.sim.campaign.people import EncounterModel
+    from qpsafe.sim.campaign.plan import MOTIONS
+
+    if plan.people is not None:
+        EncounterModel.load(plan.people)
+    if plan.cell is not None:
+        load_cell(plan.cell)
+    for motion in plan.motions:
+        if motion not in MOTIONS:
+            from qpsafe.sim.campaign.station import station
+
+            station(plan.robot, motion, cell=plan.cell)
 
 
 @contextmanager

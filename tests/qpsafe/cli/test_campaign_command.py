@@ -170,6 +170,24 @@ def test_what_cannot_be_asked_is_named_and_nothing_is_written(arguments: list[st
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("command", [[], ["show", "1"], ["limit", "1"], ["worst", "stop"]])
+@pytest.mark.parametrize("option", ["--people", "--cell", "--motions"])
+@pytest.mark.parametrize("text", ["speed = 3", "[[box]", '[[person]]\nname = "A"'])
+def test_a_wrong_file_is_named_with_its_line_before_anything_begins(
+    command: list[str], option: str, text: str, tmp_path: Path
+) -> None:
+    (tmp_path / "wrong.toml").write_text(text)
+    result = campaign(*command, option, "wrong.toml")
+    assert isinstance(result.exception, ConfigurationError)
+    assert str(result.exception).startswith("wrong.toml:1: ")
+    assert [file.name for file in tmp_path.iterdir()] == ["wrong.toml"]
+
+
+def test_a_plan_whose_robot_is_not_there_is_named_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text('trials = 3\nrobot = "mine"\n')
+    assert "plan.toml:2: robot = 'mine': expected a bundled robot" in str(campaign("plan.toml").exception)
+
+
 @pytest.mark.usefixtures("_plain_page")
 def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(tmp_path: Path) -> None:
     campaign(*FEW, "--out", "kept")

@@ -118,3 +118,12 @@ def test_what_cannot_be_asked_is_said_and_nothing_is_written(
     assert isinstance(result.exception, ConfigurationError)
     assert message in str(result.exception)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--radius", "--pedestal"])
+@pytest.mark.parametrize("value", ["-1", "0", "nan", "inf", "11"])
+def test_a_length_out_of_range_is_refused_before_any_node_is_looked_for(option: str, value: str) -> None:
+    result = run(option, value)
+    assert result.exit_code == 2
+    assert option in result.output
+    assert "node" not in result.output

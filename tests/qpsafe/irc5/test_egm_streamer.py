@@ -15,7 +15,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.irc5 import streamer as module
 from qpsafe.irc5.messages import MAX_SIZE, RobotPacket, SensorPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
-from qpsafe.irc5.streamer import EgmStreamer, interface_address
+from qpsafe.irc5.streamer import EgmStreamer, interface_address, peer_address
 from qpsafe.limits import JointLimits
 
 ROBOT = qpsafe.load_robot("irb140")
@@ -247,6 +247,17 @@ def test_a_wrong_host_is_refused_by_name(host: str) -> None:
         EgmStreamer(LIMITS, host=host, port=0)
     assert caught.value.key == "host"
     assert "an address" in str(caught.value)
+
+
+@pytest.mark.parametrize("peer", ["", "0.0.0.0", "255.255.255.255", "no such robot", "a" * 300, "::1"])
+def test_a_peer_that_nobody_can_be_is_refused_by_name(peer: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        EgmStreamer(LIMITS, peer=peer, port=0)
+    assert (caught.value.key, caught.value.value) == ("peer", peer)
+
+
+def test_a_peer_may_be_named() -> None:
+    assert peer_address("localhost") == peer_address("127.0.0.1") == "127.0.0.1"
 
 
 def test_a_taken_or_wrong_port_is_refused_by_name(streamer: EgmStreamer) -> None:

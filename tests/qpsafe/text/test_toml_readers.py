@@ -5,6 +5,7 @@ Documents are generated freely, and the bundled ones are mutated; nothing but `C
 
 from __future__ import annotations
 
+import codecs
 import re
 import shutil
 import tomllib
@@ -100,6 +101,8 @@ EXTREMES = (
 )  # fmt: skip
 values = st.sampled_from(EXTREMES) | st.floats().map(repr) | st.integers().map(str)
 VALUE = re.compile(r"(?<== )[^\n#{}]+|-?\d+\.\d+")
+#: What tells of the library that checks, and nothing to a person.
+PYDANTIC = re.compile(r"Input|Field required|Extra|Value error|discriminator|validation|tag |^(List|Tuple|Dict|String)")
 ANY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
@@ -110,12 +113,40 @@ def outcome(kind: str, text: str | bytes, folder: Path) -> Any:
     try:
         return READERS[kind][0](path)
     except ConfigurationError as error:
-        return error
+        found = error
+    assert not PYDANTIC.search(found.expected)
+    return found
 
 
 @pytest.mark.parametrize("kind", READERS)
 def test_the_bundled_ones_are_read(kind: str, tmp_path: Path) -> None:
     assert not isinstance(outcome(kind, READERS[kind][1], tmp_path), ConfigurationError)
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_an_editors_mark_and_line_ends_change_nothing(kind: str, tmp_path: Path) -> None:
+    said = READERS[kind][1]
+    lines = said.replace("\n", "\r\n").encode()
+    for changed in (codecs.BOM_UTF8 + said.encode(), lines, codecs.BOM_UTF8 + lines):
+        assert not isinstance(outcome(kind, changed, tmp_path), ConfigurationError)
+        assert toml_table(changed.decode()) == toml_table(said)
+
+
+@pytest.mark.parametrize("kind", READERS)
+@pytest.mark.parametrize("coding", ["latin-1", "utf-16"])
+def test_another_coding_is_named_with_its_line(kind: str, coding: str, tmp_path: Path) -> None:
+    found = outcome(kind, ("\n\n# Größe\n" + READERS[kind][1]).encode(coding, "replace"), tmp_path)
+    assert isinstance(found, ConfigurationError)
+    assert f"not in UTF-8, in line {3 if coding == 'latin-1' else 1}" in str(found)
+
+
+def test_the_key_that_says_the_kind_is_named(tmp_path: Path) -> None:
+    for do, said in (('do = "lien"', "segment[0].do = 'lien': expected one of 'line', 'arc'"), ("", "do = 'nothing'")):
+        found = outcome("program", f"[[segment]]\n{do}\nto = 3\n", tmp_path)
+        assert said in str(found)
+    assert "camera[1].kind = 'scaner': expected one of 'depth'" in str(
+        outcome("cameras", CAMERAS.replace('"scanner"', '"scaner"'), tmp_path)
+    )
 
 
 @pytest.mark.parametrize("kind", READERS)

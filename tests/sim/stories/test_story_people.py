@@ -339,7 +339,7 @@ WALK = STEP + 'do = "walk"\n'
     [
         ("[[person]\n", r":1: file"),
         ('[[person]]\nname = "A"\n', r":1: person\[0\]\.start = 'nothing'"),
-        (person(STEP + 'do = "fly"\n'), r":5: person\[0\]\.step\[0\]"),
+        (person(STEP + 'do = "fly"\n'), r":6: person\[0\]\.step\[0\]\.do = 'fly'"),
         (person(WALK + "to = [1.0, 0.0]\nspeed = 2.6\n"), r":8: person\[0\]\.step\[0\]\.speed = 2\.6"),
         (person(WALK + "to = [1.0, nan]\n"), r":7: person\[0\]\.step\[0\]\.to"),
         (person(WALK + "to = [2.0, 0.0]\n"), r":7: .*at least 0\.05 m"),
