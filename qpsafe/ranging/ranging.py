@@ -24,7 +24,7 @@ from qpsafe.ranging.tracking.velocities import MOST, Velocities
 from qpsafe.ranging.unseen import Together
 from qpsafe.ranging.watch import LATE, SensorWatch
 from qpsafe.sensing.body import surrounding_hulls
-from qpsafe.sensing.detection import BadInput
+from qpsafe.sensing.detection import BadInput, reals
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -66,7 +66,7 @@ class RangeSensing:
         self._rules = RangeRules() if rules is None else rules
         hulls = surrounding_hulls(robot, self.sensing.self_detection, known, carried)
         self._robot, count, links = robot, len(self.sensors), len(robot.wire_frames)
-        self._judges = [Judge(sensor) for sensor in self.sensors]
+        self._judges = [Judge(sensor, self.rules, self.sensing.tolerance) for sensor in self.sensors]
         self._watches = [SensorWatch(sensor, self.rules, self.sensing) for sensor in self.sensors]
         self._reducers = [Reducer(sensor, self.rules, self.sensing, hulls, links) for sensor in self.sensors]
         self._mounts = [
@@ -100,9 +100,9 @@ class RangeSensing:
             )
         self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
-        self._past = Configurations(robot.nq)
-        self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
-        self._inbox = Inbox(self.sensors, self.rules.budget)
+        self._past = Configurations(robot.nq, float(self._patience.max()))
+        self.most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
+        self.inbox = Inbox(self.sensors, self.rules.budget)
         self._seen = np.zeros(count)
         self.reset()
 
@@ -143,7 +143,7 @@ class RangeSensing:
             self._together.reset()
         self._hidden_places, self._looked = _NONE, False
         self._past.reset()
-        self._inbox.reset()
+        self.inbox.reset()
         self.unseen: tuple[str, ...] = ()
         self.stopped = self._doubted = False
         self._now = -inf
@@ -153,7 +153,7 @@ class RangeSensing:
         """A person has looked: sensors that see again are trusted again, a stop they caused is lifted."""
         for watch in self._watches:
             watch.acknowledge(self._now)
-        self.stopped = sum(watch.dead for watch in self._watches) > self._most
+        self.stopped = sum(watch.dead for watch in self._watches) > self.most
 
     def update(
         self, images: Any, now: float, state: RobotState, field: Any, qd: Array, person: float = PERSON
@@ -187,17 +187,13 @@ class RangeSensing:
         points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
         points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
+        danger = reals("the field's value", danger, (total,))
+        if not np.isfinite(danger).all():  # it would never be the largest
+            raise BadInput("the danger of a seen point is not finite")
         count = choose(
-            points,
-            links,
-            self._who[:total],
-            danger,
-            self.rules.most,
-            self.rules.apart,
-            self._marks,
-            self._used,
+            points, links, self._who[:total], danger, self.rules.most, self.rules.apart, self._marks, self._used,
             self._chosen,
-        )
+        )  # fmt: skip
         chosen = self._chosen[:count]
         near = np.concatenate((self._near[:total], hidden))
         leads = np.concatenate((self._leads[:total], np.zeros(len(hidden))))
@@ -220,7 +216,8 @@ class RangeSensing:
 
     def _take_all(self, images: Any, now: float, wire: Wire) -> list[str]:
         """Take the images that came, as many as there is time for; what is wrong, in words."""
-        taken, notes = self._inbox.take(images)
+        self.inbox.put(images)
+        taken, notes = self.inbox.take()
         for who, image in taken:
             try:
                 wrong = self._take(who, image, now, wire)
@@ -270,7 +267,7 @@ class RangeSensing:
         if self._begin:
             for watch in self._watches:
                 watch.begin = now
-            self._seen[:], self._begin = now, False
+            self._seen[:], self._begin = [watch.seen for watch in self._watches], False
         if not (self._doubted or (now - self._seen > self._patience).any()):
             return []
         kinds: dict[str, list[str]] = {}
@@ -283,11 +280,11 @@ class RangeSensing:
         self.unseen, self._doubted = tuple(unseen), bool(unseen)
         if not unseen:
             return []
-        self.stopped |= sum(watch.dead for watch in self._watches) > self._most
+        self.stopped |= sum(watch.dead for watch in self._watches) > self.most
         notes = [f"range sensors {what}, unseen what is before them: {', '.join(who)}" for what, who in kinds.items()]
-        if self.stopped or len(unseen) > self._most:
+        if self.stopped or len(unseen) > self.most:
             more = "stopped until acknowledged" if self.stopped else "stopped until they see again"
-            raise BadInput("; ".join((f"more than {self._most} range sensors do not see: {more}", *notes)))
+            raise BadInput("; ".join((f"more than {self.most} range sensors do not see: {more}", *notes)))
         return notes
 
 

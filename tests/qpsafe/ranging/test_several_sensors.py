@@ -78,3 +78,18 @@ def test_behind_things_somebody_may_stand_if_that_is_asked_for(run: Any, eyes: A
             found[rules.unseen, name] = int(beyond.sum())
     assert found["free", "nothing"] == found["free", "board"] == 0
     assert found["occupied", "board"] > found["occupied", "nothing"] + 20
+
+
+@pytest.mark.parametrize(("spots", "arrays"), [(0, 0), (4, 1), (4, 2), (3, 2), (3, 3), (1, 5), (0, 5), (5, 0)])
+def test_too_many_that_do_not_see_are_too_many_of_whatever_kind(run: Any, eyes: Any, spots: int, arrays: int) -> None:
+    """A fifth of 20 spots and 5 arrays together, and of the spots alone."""
+    pose = eyes.looking((0.2, 0.0, 0.6), (1.6, 0.3, 0.9))
+    sensors = [RangeSensor.array(f"array {i}", pose=pose) for i in range(5)]
+    loop = run(range_sensors=sensors)
+    read = np.where(np.arange(20) < spots, np.nan, np.inf)
+    for k in range(70):
+        images = [s.image(np.full(64, np.inf), stamp=k * 0.004) for s in sensors[arrays:]] if k % 10 == 0 else []
+        tick = loop.feed(loop.q, loop.qd, read, images=images)
+    assert len(tick.unseen) == spots + arrays
+    stops = spots > 4 or spots + arrays > 5
+    assert tick.status == ("bad_input" if stops else "degraded" if spots + arrays else "ok")
