@@ -99,6 +99,7 @@ class SeparationLimit(Fixed):
         points: Array,
         age: float = 0.0,
         *,
+        come: float = 0.0,
         qd: Array | None = None,
         limits: JointLimits | None = None,
     ) -> SeparationLevel | None:
@@ -109,6 +110,7 @@ class SeparationLimit(Fixed):
             parts: Capsules around its links.
             points: What is seen (p, 3) [m].
             age: How old that is [s]: the person may be nearer by v_h age.
+            come: How much nearer anybody may be, if that is more [m].
             qd: Last commanded velocity (n,) [rad/s]; with `limits`, rows that no command of the tick can reach are left
                 out. They would change nothing.
             limits: Joint limits of the tick.
@@ -118,7 +120,7 @@ class SeparationLimit(Fixed):
             return None
         distances, A = parts.approaches(state, points)  # (c p,), (c p, n)
         figures, held = self.separation, 0.0 if limits is None else limits.dt
-        upper = figures.speed(distances - figures.person_speed * age, held)
+        upper = figures.speed(distances - max(figures.person_speed * age, come), held)
         kept = np.isfinite(upper)
         if limits is not None and qd is not None:
             # the largest nᵀJ q̇ of any q̇ within a dt of the last one

@@ -53,7 +53,8 @@ class Judge:
         """Its arrays.
 
         Raises:
-            BadInput: They do not fit, or are no numbers; or the image was made with other optics than were declared.
+            BadInput: They do not fit, or are no numbers; or the image is of a sensor of other optics, or in
+                another place, than were declared.
         """
         sensor, size = self._sensor, len(self._sensor)
         if image.sensor is not self._same:
@@ -61,6 +62,8 @@ class Judge:
                 raise BadInput(
                     f"its zones are others than declared: {image.sensor.shape}, not {sensor.shape}, or turned"
                 )
+            if not sensor.same_place(image.sensor):
+                raise BadInput("its sensor is fixed elsewhere than declared: where it is, is given at construction")
             self._same = image.sensor
         distances = self._fitting("distances", as_floats("distances", image.distances))
         valid, sigma = self._all, self._sigma

@@ -231,6 +231,10 @@ class RangeSensor:
             and np.allclose(self.half_angle, other.half_angle, atol=1e-9, rtol=0.0)
         )
 
+    def same_place(self, other: RangeSensor) -> bool:
+        """Whether another sensor is fixed where this one is."""
+        return self is other or (self.mount == other.mount and np.allclose(self.pose, other.pose, atol=1e-9, rtol=0.0))
+
     def check(self, robot: Robot) -> None:
         """Whether a robot's cell can hold this sensor.
 

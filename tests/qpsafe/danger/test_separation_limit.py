@@ -305,3 +305,16 @@ def test_the_nearest_of_every_part_come_first(seed, most):
         assert not outside.any() or gaps[inside].max(initial=0.0) <= gaps[outside].min()
     counts = [np.isin(rows[parts == part], kept).sum() for part in range(5)]
     assert all(counts[part] == (parts == part).sum() for part in range(5) if counts[part] < max(counts) - 1)
+
+
+@given(st.integers(0, 10**6), st.floats(0.0, 0.3))
+@settings(max_examples=20)
+def test_what_somebody_may_have_come_counts_as_distance(seed, come):
+    """However fast people are: errors of places are no times."""
+    rng = np.random.default_rng(seed)
+    q, _ = some_state(ROBOT, rng)
+    points, age = rng.uniform(-0.5, 0.5, (4, 3)) + np.array([0.3, 0.0, 0.6]), rng.uniform(0.0, 0.2)
+    for v_h in (0.0, 0.3, 1.6):
+        figures = Separation(2.0, person_speed=v_h)
+        level = SeparationLimit(figures).level(ROBOT.at(q), PARTS["irb140"], points, age, come=come)
+        assert np.allclose(level.upper, figures.speed(level.gaps - max(v_h * age, come)), atol=1e-12)

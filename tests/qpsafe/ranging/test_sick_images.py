@@ -15,6 +15,7 @@ from qpsafe.ranging.sensor import RangeImage, RangeSensor
 from qpsafe.sensing.hulls import Obstacle
 
 DT = 0.004
+UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.01], [0.0, 0.0, 0.0, 1.0]])
 TABLE = Obstacle.box("table", (1.6, 1.2, 0.1), (0.9, 0.0, -0.15))
 
 
@@ -84,6 +85,13 @@ SICK: dict[str, tuple[Callable[[RangeSensor, np.ndarray, int, Any], RangeImage],
     "wrong intrinsics": (
         lambda s, d, k, _: RangeSensor.array("array", field_of_view=1.0, pose=s.pose).image(d, stamp=k * DT),
         "zones are others",
+    ),
+    "of a sensor elsewhere": (
+        lambda s, d, k, _: s.placed(UP @ s.pose).image(d, stamp=k * DT),
+        "elsewhere",
+    ),
+    "of a sensor on another frame": (
+        lambda s, d, k, _: s.placed(s.pose, "dh3").image(d, stamp=k * DT), "elsewhere",
     ),
     "sees through": (lambda s, d, k, _: s.image(np.full(64, 3.5), stamp=k * DT), "sees through"),
     "nothing where something is": (lambda s, d, k, _: s.image(np.full(64, np.inf), stamp=k * DT), "sees through"),
