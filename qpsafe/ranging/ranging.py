@@ -98,7 +98,6 @@ class RangeSensing:
                 self.sensing.approach_speed,
                 total,
             )
-        self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq, float(self._patience.max()))
         self.most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
@@ -141,7 +140,7 @@ class RangeSensing:
         self._counts[:] = 0
         if self._together is not None:
             self._together.reset()
-        self._hidden_places, self._looked = _NONE, False
+        self._hidden_places, self._looked, self._hidden_at = _NONE, False, 0.0
         self._past.reset()
         self.inbox.reset()
         self.unseen: tuple[str, ...] = ()
@@ -182,8 +181,9 @@ class RangeSensing:
             *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
         hidden = self._hidden(now, state, wire)
+        since = np.full(len(hidden), now - self._hidden_at)  # who may have stood there may have come since
         if not total:
-            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
+            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, since, tuple(notes))
         points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
         points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
@@ -196,13 +196,14 @@ class RangeSensing:
         )  # fmt: skip
         chosen = self._chosen[:count]
         near = np.concatenate((self._near[:total], hidden))
-        leads = np.concatenate((self._leads[:total], np.zeros(len(hidden))))
+        leads = np.concatenate((self._leads[:total], since))
         return Ranged(points[chosen], links[chosen], velocities[chosen], near, leads, tuple(notes))
 
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
         if self.rules.unseen == OCCUPIED and self._looked and self._together is not None:
-            self._hidden_places, self._looked = self._together.unseen(wire, state.body_poses(), now), False
+            places = self._together.unseen(wire, state.body_poses(), now)
+            self._hidden_places, self._looked, self._hidden_at = places, False, now
         return self._hidden_places
 
     def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:

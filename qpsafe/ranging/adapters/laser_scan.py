@@ -112,7 +112,7 @@ class LaserScanner:
         try:
             rays = np.array([0, len(self.sensor) // 2, len(self.sensor) - 1])
             angles = float(scan.angle_min) + float(scan.angle_increment) * rays
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             return False
         ahead = self.sensor.directions[rays, :2]
         return bool((np.abs(np.stack((np.cos(angles), np.sin(angles)), axis=1) - ahead) <= 1e-3).all())
@@ -125,5 +125,5 @@ def _stamp(scan: Any) -> float:
         if hasattr(stamp, "nanosec"):
             return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
         return float(stamp.to_sec()) if hasattr(stamp, "to_sec") else float("nan")
-    except (TypeError, ValueError):
+    except Exception:  # whatever a stranger's stamp raises
         return float("nan")
