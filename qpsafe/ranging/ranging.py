@@ -170,7 +170,7 @@ class RangeSensing:
         Raises:
             BadInput: Too many sensors do not see; or the clock cannot tell how old anything is.
         """
-        self._now = check_clock(now, self._now)
+        now = self._now = check_clock(now, self._now)
         self._past.take(now, state.q)
         wire = state.wire(qd)
         notes = self._take_all(images, now, wire)
