@@ -189,6 +189,7 @@ class SafetyController(Running):
         now: float | None,
     ) -> Tick:
         """All that may fail, and all that asks parts of the user's making; the command does not advance here."""
+        self._receive(images)
         if not self._active:  # the commanded configuration starts where the robot is
             here, _ = as_joint_position(q, self._robot), as_joint_velocity(qd, self._robot)
             self._q, self._active = np.array(here), True
@@ -231,8 +232,7 @@ class SafetyController(Running):
         else:
             resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
         command = resolved.command if separation is None else kept_apart(soft, resolved.command, resolved.box)
-        usual = resolved.excess <= 1e-9 and resolved.solved
-        messages = () if usual else judged(resolved, self._robot.joint_names)
+        messages = () if resolved.excess <= 1e-9 and resolved.solved else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:

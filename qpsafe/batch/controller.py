@@ -45,6 +45,9 @@ class BatchController:
     ) -> None:
         if not isinstance(controller, SafetyController):
             raise ConfigurationError("BatchController", "controller", controller, "a SafetyController")
+        if controller.ranging is not None:  # its robots would go on without what they see by
+            expected = "none: a batch takes no images; give distances or points"
+            raise ConfigurationError("BatchController", "range_sensors", controller.ranging.sensors, expected)
         for key, value in (("n", n), ("threads", 1 if threads is None else threads)):
             if not (isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 1):
                 raise ConfigurationError("BatchController", key, value, "a whole number >= 1")

@@ -14,13 +14,14 @@ the largest speed towards a person at distance d; 0 where d is below S_p(0).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+
+_LARGEST = 1e100  # its square is a number, too
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class Separation:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if not (isinstance(value, int | float) and 0.0 <= value < math.inf):
+            real = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (real and 0.0 <= value <= _LARGEST):
                 raise ConfigurationError("Separation", item.name, value, "a finite number >= 0")
         if not self.deceleration > 0.0:
             raise ConfigurationError("Separation", "deceleration", self.deceleration, "a finite number > 0 [m/s²]")

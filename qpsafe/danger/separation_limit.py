@@ -43,13 +43,26 @@ class SeparationLevel(Level):
         names: Of the links' parts, one a row.
         points: Number of the seen point of each row (rows,).
         gaps: Its distance to that part (rows,) [m].
+        beyond: nᵀ J and v_max of what is left out, where more than `MOST` rows can bind.
     """
 
-    __slots__ = ("gaps", "names", "points")
+    __slots__ = ("beyond", "gaps", "names", "points")
 
-    def __init__(self, A: Array, upper: Array, names: tuple[str, ...], points: Index, gaps: Array) -> None:
+    def __init__(
+        self, A: Array, upper: Array, names: tuple[str, ...], points: Index, gaps: Array,
+        beyond: tuple[Array, Array] | None = None,
+    ) -> None:  # fmt: skip
         super().__init__(A, -np.inf, upper)
-        self.names, self.points, self.gaps = names, points, gaps
+        self.names, self.points, self.gaps, self.beyond = names, points, gaps, beyond
+
+    def slowed(self, command: Array) -> Array:
+        """A command (n,) [rad/s], slower by as much as the rows that were left out ask for: v_max >= 0."""
+        if self.beyond is None:
+            return command
+        A, upper = self.beyond
+        speeds = A @ command
+        over = speeds > upper
+        return command * float((upper[over] / speeds[over]).min(initial=1.0))
 
     def binding(self, qd: Array) -> tuple[tuple[str, int, float], ...]:
         """Rows that bind at q̇ (n,) [rad/s]: the part, the point's number, their distance [m]."""
@@ -86,6 +99,7 @@ class SeparationLimit(Fixed):
         points: Array,
         age: float = 0.0,
         *,
+        come: float = 0.0,
         qd: Array | None = None,
         limits: JointLimits | None = None,
     ) -> SeparationLevel | None:
@@ -96,6 +110,7 @@ class SeparationLimit(Fixed):
             parts: Capsules around its links.
             points: What is seen (p, 3) [m].
             age: How old that is [s]: the person may be nearer by v_h age.
+            come: How much nearer anybody may be, if that is more [m].
             qd: Last commanded velocity (n,) [rad/s]; with `limits`, rows that no command of the tick can reach are left
                 out. They would change nothing.
             limits: Joint limits of the tick.
@@ -105,7 +120,7 @@ class SeparationLimit(Fixed):
             return None
         distances, A = parts.approaches(state, points)  # (c p,), (c p, n)
         figures, held = self.separation, 0.0 if limits is None else limits.dt
-        upper = figures.speed(distances - figures.person_speed * age, held)
+        upper = figures.speed(distances - max(figures.person_speed * age, come), held)
         kept = np.isfinite(upper)
         if limits is not None and qd is not None:
             # the largest nᵀJ q̇ of any q̇ within a dt of the last one
@@ -113,8 +128,29 @@ class SeparationLimit(Fixed):
         rows = np.flatnonzero(kept)
         if not len(rows):
             return None
+        rows, left = nearest_first(rows, rows // len(points), distances[rows], MOST)
+        beyond = (A[left], upper[left]) if len(left) else None
         names = tuple([parts.names[k // len(points)] for k in rows.tolist()])
-        return SeparationLevel(A[rows], upper[rows], names, rows % len(points), distances[rows])
+        return SeparationLevel(A[rows], upper[rows], names, rows % len(points), distances[rows], beyond)
+
+
+def nearest_first(rows: Index, parts: Index, gaps: Array, most: int) -> tuple[Index, Index]:
+    """Some of the rows, in their order, and the others: what is nearest to each part, then what is second nearest ...
+
+    Args:
+        rows: Their numbers, rising (r,).
+        parts: Of which part each is (r,), rising.
+        gaps: Distances (r,) [m].
+        most: How many.
+    """
+    if len(rows) <= most:
+        return rows, rows[:0]
+    order = np.lexsort((gaps, parts))
+    rank = np.empty(len(rows), dtype=np.int64)
+    rank[order] = np.arange(len(rows)) - np.searchsorted(parts, parts[order])
+    chosen = np.zeros(len(rows), dtype=np.bool_)
+    chosen[np.lexsort((gaps, rank))[:most]] = True
+    return rows[chosen], rows[~chosen]
 
 
 def kept_apart(soft: Sequence[Level], command: Array, box: Box | None) -> Array:
@@ -128,13 +164,16 @@ def kept_apart(soft: Sequence[Level], command: Array, box: Box | None) -> Array:
         box: Admissible velocities, if there are limits.
     """
     apart = [level for level in soft if isinstance(level, SeparationLevel)]
-    if all((level.A @ command <= level.upper + _MET).all() for level in apart):
-        return command
-    bounds = (None, None) if box is None else (box.lower, box.upper)
-    nearest = solve_hierarchy([*soft, (np.eye(len(command)), command)], *bounds).qd
-    if not np.isfinite(nearest).all():
-        return command
-    return nearest if box is None else box.clip(nearest)
+    if not all((level.A @ command <= level.upper + _MET).all() for level in apart):
+        bounds = (None, None) if box is None else (box.lower, box.upper)
+        nearest = solve_hierarchy([*soft, (np.eye(len(command)), command)], *bounds).qd
+        if np.isfinite(nearest).all():
+            command = nearest if box is None else box.clip(nearest)
+    for level in apart:
+        if level.beyond is not None:
+            slowed = level.slowed(command)
+            command = slowed if box is None else box.clip(slowed)
+    return command
 
 
 def oldest(ages: Array, max_age: float) -> float:
@@ -148,3 +187,4 @@ def oldest(ages: Array, max_age: float) -> float:
 
 
 _MET = 1e-9  # [m/s]
+MOST = 600  # rows of a tick: thirty parts and twenty points; memory and time of the solver grow with their square

@@ -51,7 +51,7 @@ class VerifiedMotion(Fixed):
             positive = key in ("approach", "margin")
             try:
                 number = float(value)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 number = math.nan
             enough = number > 0.0 if positive else number >= 0.0
             if isinstance(value, bool) or not enough or not (number < math.inf or key == "sidestep"):

@@ -14,7 +14,7 @@ from qpsafe.errors import in_words
 from qpsafe.gate import braking_path
 from qpsafe.gate.braking_path import slow_down
 from qpsafe.limits import Box, JointLimits
-from qpsafe.pipeline.checks import reals
+from qpsafe.sensing.detection import reals
 
 Array = NDArray[np.float64]
 

@@ -21,6 +21,7 @@ from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.problem import Law, LawResult
 from qpsafe.limits import KINDS, Box, JointLimits
 from qpsafe.recovery.returns import RecoveryRules
+from qpsafe.sensing.detection import reals
 from qpsafe.tasks.task import Task
 from qpsafe.text.words import counted
 
@@ -171,30 +172,6 @@ def checked_recovery(rules: RecoveryRules) -> RecoveryRules:
     if not isinstance(rules, RecoveryRules):
         raise ConfigurationError("SafetyController", "recovery", rules, "RecoveryRules")
     return rules
-
-
-def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """What a part of another making answered, as float64 of this shape; its own array if it may be.
-
-    Args:
-        whose: What a person calls it, for the error.
-        value: What came.
-        shape: That is expected.
-
-    Raises:
-        TypeError: Text, something complex, masked or no numbers at all.
-        ValueError: Another shape.
-    """
-    array = value
-    if not (type(array) is np.ndarray and array.dtype == _FLOAT):
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu" or np.ma.is_masked(value):
-            what = "of masked values" if array.dtype.kind in "fiu" else f"of {array.dtype}"
-            raise TypeError(f"{whose} is not an array of real numbers but {what}")
-        array = array.astype(float)
-    if array.shape != shape:
-        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
-    return array
 
 
 def checked_box(box: Any, limits: JointLimits, q: NDArray[np.float64], qd: NDArray[np.float64]) -> Box:

@@ -255,8 +255,11 @@ class Parts(Sensors):
         if self._separation is None:
             return ()
         state = self._robot.at(as_joint_position(measured, self._robot))
-        age = max(oldest(ages, self._rules.max_age), float(seen.leads.max(initial=0.0)))
+        age = oldest(ages, self._rules.max_age)
+        # leads are told for people of one speed: in part they are errors of places
+        fast = max(self._separation.separation.person_speed, self._person_speed)
+        come = fast * float(seen.leads.max(initial=0.0))
         rows = self._separation.level(
-            state, self._stages.link_parts, seen.people, age, qd=self._qd, limits=self._limits
+            state, self._stages.link_parts, seen.people, age, come=come, qd=self._qd, limits=self._limits
         )
         return () if rows is None else (rows,)

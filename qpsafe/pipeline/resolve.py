@@ -23,9 +23,10 @@ from qpsafe.laws.hierarchical import weigh
 from qpsafe.laws.kinds import NULLSPACE, OTHER, PAPER, STRICT, WEIGHTED, kind_of, numbers_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.limits import Box, JointLimits
-from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity, reals
+from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.recovery.returning import Led
+from qpsafe.sensing.detection import reals
 from qpsafe.tasks.task import PoseTask
 
 if TYPE_CHECKING:

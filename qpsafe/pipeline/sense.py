@@ -19,7 +19,6 @@ from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
 from qpsafe.gate.gated import NO_AGES
-from qpsafe.pipeline.checks import reals
 from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
 from qpsafe.ranging.ranged import PERSON, Ranged
 from qpsafe.robot.wire import Wire
@@ -30,6 +29,7 @@ from qpsafe.sensing.detection import (
     as_joint_velocity,
     as_points,
     plausible,
+    reals,
     refuse,
     refuse_points,
 )
@@ -120,6 +120,8 @@ class Sense:
     ) -> Seen:  # fmt: skip
         """Sense one tick; arguments as for `SafetyController.step`, and how fast people come [m/s].
 
+        Images are in the inbox already, whatever else is wrong with a tick.
+
         Raises:
             BadInput: Wrong shapes, or values that are no measurement; too many sensors out of order; a point, or its
                 danger, that is not finite; both or neither of distances and points: silence is not safety, "nothing in
@@ -134,7 +136,7 @@ class Sense:
         if self._ranging is not None:
             state = self._robot.at(as_joint_position(q, self._robot))
             as_joint_velocity(qd, self._robot)
-            more = self._ranging.update(() if images is None else images, now, state, self.parts[1], qd, person)
+            more = self._ranging.update((), now, state, self.parts[1], qd, person)
             if distances is None and points is None and self.parts[0] is None:
                 points = _NOBODY
         elif images is not None:
@@ -170,7 +172,7 @@ class Sense:
         seen = Seen(
             points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, severity != CLEAR
         )
-        seen = self._with(seen, more)
+        seen = self._with(seen, more, readings=True)
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
@@ -201,10 +203,19 @@ class Sense:
         kept = reduced(given, wire)
         return kept, (f"{counted(len(given), 'point')} are reduced to those nearest to the links, {len(kept)}",)
 
-    def _with(self, seen: Seen, more: Ranged) -> Seen:
-        """The same with what images tell beside their points."""
+    def _with(self, seen: Seen, more: Ranged, readings: bool = False) -> Seen:
+        """The same with what images tell beside their points.
+
+        Raises:
+            BadInput: With the spots, if their readings are given, too many sensors do not see.
+        """
         if self._ranging is None:
             return seen
+        spots = self.parts[0].unseen if readings and self.parts[0] is not None else ()
+        out = len(spots) + len(self._ranging.unseen) if spots else 0  # either kind alone has been counted
+        if out > self._ranging.most:
+            notes = "; ".join((*seen.notes, *more.notes))
+            raise BadInput(f"more than {self._ranging.most} of all sensors do not see: stopped until they do; {notes}")
         capped = seen.capped or self._ranging.severity != CLEAR
         return seen._replace(notes=(*seen.notes, *more.notes), capped=capped, near=more.near, leads=more.leads)
 

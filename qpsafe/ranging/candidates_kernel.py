@@ -7,7 +7,7 @@ speed of ISO 13855, as with spots.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf, isfinite, sqrt
 
 from numba import types
 
@@ -169,12 +169,14 @@ def choose(
         chosen, chosen_links, chosen_velocities: Filled, in falling order of danger (p, 3), (p,), (p, 3).
 
     Returns:
-        How many were chosen.
+        How many were chosen; -1 if a danger is not finite: it would never be the largest.
     """  # fmt: skip
     count, total = points.shape[0], 0
     used[:] = 0
     for i in range(count):
         marks[i] = 0
+        if not isfinite(danger[i]):
+            return -1
     while True:
         best = -1
         for i in range(count):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import inf
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from qpsafe.errors import ConfigurationError
-from qpsafe.ranging.sensor import RangeSensor
+from qpsafe.ranging.sensor import WORLD, RangeSensor
 from qpsafe.sensing.detection import BadInput
 
 if TYPE_CHECKING:
@@ -34,14 +37,42 @@ def checked_sensors(sensors: Any, robot: Robot) -> tuple[RangeSensor, ...]:
     return tuple(found.values())
 
 
-def check_clock(now: float, before: float) -> float:
+def as_time(name: str, value: Any) -> float:
+    """A time that came with data [s].
+
+    Raises:
+        BadInput: It is no number, or not finite.
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+        raise BadInput(f"{name} is no time: {type(value).__name__}")
+    try:
+        time = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        time = inf
+    if not isfinite(time):
+        raise BadInput(f"{name} is not finite: {name} = {time} s")
+    return time
+
+
+def check_clock(now: Any, before: float) -> float:
     """The present time [s], unless no image would ever be stale by it.
 
     A clock that was set back is refused until it has caught up, or until the controller is reset.
 
     Raises:
-        BadInput: It is not finite, or not later than that of the last tick.
+        BadInput: It is no number, not finite, or not later than that of the last tick.
     """
-    if not before < now < inf:
-        raise BadInput(f"now = {now} s, expected a finite time later than that of the last tick, {before} s")
-    return now
+    time = as_time("now", now)
+    if not before < time:
+        raise BadInput(f"now = {time} s, expected a time later than that of the last tick, {before} s")
+    return time
+
+
+def mounting(robot: Robot, sensor: RangeSensor) -> tuple[int, NDArray[np.float64]]:
+    """The robot's body that carries a sensor, 0 for the world, and its pose there (4, 4)."""
+    if sensor.mount == WORLD:
+        return 0, sensor.pose
+    body, place = robot.mounting(sensor.mount)
+    return body, place @ sensor.pose

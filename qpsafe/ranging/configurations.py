@@ -13,12 +13,14 @@ class Configurations:
 
     Args:
         joints: n.
+        span: For how long they are kept at least [s]. Where ticks are too short for that, those that follow one another
+            fast replace each other.
         count: How many are kept.
     """
 
-    def __init__(self, joints: int, count: int = 512) -> None:
+    def __init__(self, joints: int, span: float, count: int = 512) -> None:
         self._times, self._qs = np.full(count, -np.inf), np.zeros((count, joints))
-        self._next = 0
+        self._next, self._apart = 0, 2.0 * span / (count - 2)  # from one to the next but one
 
     def reset(self) -> None:
         """Forget all."""
@@ -30,6 +32,8 @@ class Configurations:
         count = len(self._times)
         if self._next and not time > self._times[(self._next - 1) % count]:
             self.reset()
+        if self._next > 1 and time - self._times[(self._next - 2) % count] < self._apart:
+            self._next -= 1
         self._times[self._next % count], self._qs[self._next % count] = time, q
         self._next += 1
 

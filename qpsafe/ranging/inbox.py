@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Sequence
+from math import inf
 from typing import Any
 
+from qpsafe.ranging.checks import as_time
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
+from qpsafe.sensing.detection import BadInput
+
+#: Images of each sensor that wait, at most, while no tick can take any; and for the next one, where there is no time.
+MOST, LEFT = 100, 4
 
 
 class Inbox:
@@ -24,40 +29,59 @@ class Inbox:
 
     def reset(self) -> None:
         """Forget all."""
-        self._waiting: deque[Any] = deque()
+        self._waiting: list[tuple[float, int, RangeImage]] = []
+        self._notes: list[str] = []
 
-    def take(self, images: Any) -> tuple[list[tuple[int, RangeImage]], list[str]]:
-        """Images to be taken now with the numbers of their sensors; what is wrong, in words.
+    def put(self, images: Any) -> None:
+        """Keep images until they are taken, the oldest first: what one has lost, a later one may look through.
 
         Args:
             images: That came since the last call, in any order.
         """
         if isinstance(images, RangeImage):
             images = (images,)
-        taken: list[tuple[int, RangeImage]] = []
-        notes: list[str] = []
-        if isinstance(images, Iterable):
-            self._waiting.extend(images)
-        else:
-            notes.append(f"images are no list of RangeImages but {type(images).__name__}")
-        used = 0
-        while self._waiting:
-            who = self._sender(self._waiting[0])
+        if not isinstance(images, Iterable):
+            self._notes.append(f"images are no list of RangeImages but {type(images).__name__}")
+            return
+        for image in images:
+            who = self._sender(image)
             if isinstance(who, str):
-                notes.append(who)
-            elif used and used + self._sizes[who] > self._budget:
-                break  # the rest waits for the next tick
+                self._notes.append(who)
             else:
-                used += self._sizes[who]
-                taken.append((who, self._waiting[0]))
-            self._waiting.popleft()
-        while len(self._waiting) > 4 * len(self._sizes):
-            self._waiting.popleft()
-            notes.append("images come faster than they can be taken: the oldest are left out")
+                self._waiting.append((_when(image), who, image))
+        self._waiting.sort(key=lambda one: one[:2])
+        self._leave_out(MOST)
+
+    def take(self) -> tuple[list[tuple[int, RangeImage]], list[str]]:
+        """Images to be taken now with the numbers of their sensors; what is wrong, in words."""
+        used, count = 0, 0
+        for _, who, _ in self._waiting:
+            used += self._sizes[who]
+            if count and used > self._budget:
+                break  # the rest waits for the next tick
+            count += 1
+        taken, self._waiting = [one[1:] for one in self._waiting[:count]], self._waiting[count:]
+        self._leave_out(LEFT)
+        notes, self._notes = self._notes, []
         return taken, notes
+
+    def _leave_out(self, most: int) -> None:
+        """Let no more images wait than so many for each sensor."""
+        more = len(self._waiting) - most * len(self._sizes)
+        if more > 0:
+            del self._waiting[:more]
+            self._notes.append("images come faster than they can be taken: the oldest are left out")
 
     def _sender(self, image: Any) -> int | str:
         if not (isinstance(image, RangeImage) and isinstance(image.sensor, RangeSensor)):
             return "an image is no RangeImage"
         found = self._index.get(image.sensor.name)
         return f"an image is of {image.sensor.name!r}, which is not among range_sensors" if found is None else found
+
+
+def _when(image: RangeImage) -> float:
+    """The stamp of an image; what is none comes first, to be refused."""
+    try:
+        return as_time("stamp", image.stamp)
+    except BadInput:
+        return -inf

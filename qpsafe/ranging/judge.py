@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from math import isfinite
-from typing import NamedTuple
+from math import inf
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.ranging.checks import as_time
+from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 from qpsafe.sensing.detection import BadInput, as_floats
 
@@ -20,7 +22,7 @@ class Usable(NamedTuple):
     Attributes:
         distances: (z,) [m], any numbers.
         valid: Which zones tell anything (z,).
-        sigma: (z,) [m], finite, at least 0.
+        sigma: (z,) [m], finite, at least 0; without strides where it is one number.
         stamp: [s].
         shape: Rows and columns.
     """
@@ -37,17 +39,22 @@ class Judge:
 
     Args:
         sensor: As it was declared.
+        rules: Numbers for images.
+        tolerance: How far before known things a point is still taken for them [m].
     """
 
-    def __init__(self, sensor: RangeSensor) -> None:
+    def __init__(self, sensor: RangeSensor, rules: RangeRules, tolerance: float) -> None:
         self._sensor, self._same = sensor, sensor
-        self._all, self._sigma = np.ones(len(sensor), dtype=np.bool_), np.full(len(sensor), sensor.sigma)
+        # of what a larger sigma says nothing is told: all that matters could be the robot itself
+        self._vague = max(rules.reach - tolerance, 0.0) / max(rules.deviations, 1e-9)
+        self._all, self._sigma = np.ones(len(sensor), dtype=np.bool_), np.broadcast_to(sensor.sigma, (len(sensor),))
 
     def __call__(self, image: RangeImage) -> Usable:
         """Its arrays.
 
         Raises:
-            BadInput: They do not fit, or are no numbers; or the image was made with other optics than were declared.
+            BadInput: They do not fit, or are no numbers; or the image is of a sensor of other optics, or in
+                another place, than were declared.
         """
         sensor, size = self._sensor, len(self._sensor)
         if image.sensor is not self._same:
@@ -55,31 +62,37 @@ class Judge:
                 raise BadInput(
                     f"its zones are others than declared: {image.sensor.shape}, not {sensor.shape}, or turned"
                 )
+            if not sensor.same_place(image.sensor):
+                raise BadInput("its sensor is fixed elsewhere than declared: where it is, is given at construction")
             self._same = image.sensor
-        distances = self._array("distances", image.distances)
+        distances = self._fitting("distances", as_floats("distances", image.distances))
         valid, sigma = self._all, self._sigma
         if image.valid is not None:
-            valid = np.asarray(image.valid)
-            if valid.dtype != np.bool_ or valid.size != size:
-                raise BadInput(f"valid is of {valid.dtype} and shape {valid.shape}, expected bool and {size} zones")
-            valid = valid.reshape(size)
+            valid = self._fitting("valid", _flags(image.valid))
         if image.sigma is not None:
-            sigma = (
-                np.broadcast_to(as_floats("sigma", image.sigma).ravel(), (size,))
-                if np.size(image.sigma) == 1
-                else self._array("sigma", image.sigma)
-            )
-            if not (np.isfinite(sigma) | ~valid).all() or (sigma < 0.0).any():
-                raise BadInput("sigma is not finite, or below zero, where zones are valid")
-        stamp = image.stamp
-        if isinstance(stamp, bool) or not isinstance(stamp, float | int | np.floating | np.integer):
-            raise BadInput(f"stamp is no time: {type(stamp).__name__}")
-        if not isfinite(stamp):
-            raise BadInput(f"stamp is not finite: {stamp}")
-        return Usable(distances, valid, sigma, float(stamp), sensor.shape)
+            sigma = as_floats("sigma", image.sigma)
+            sigma = np.broadcast_to(sigma.ravel(), (size,)) if sigma.size == 1 else self._fitting("sigma", sigma)
+            none = ~((sigma >= 0.0) & (sigma < inf))  # true for NaN
+            if none.any():  # of what reads nothing, or cannot tell, nobody asks for it
+                if (none & valid & (distances <= sensor.range_max)).any():
+                    raise BadInput("sigma is not finite, or below zero, where zones are valid")
+                sigma = np.where(none, sensor.sigma, sigma)
+        if (image.sigma is not None or sensor.sigma > self._vague) and sigma.max() > self._vague:
+            valid = valid & ((sigma <= self._vague) | (distances < sensor.range_min))
+        return Usable(distances, valid, sigma, as_time("stamp", image.stamp), sensor.shape)
 
-    def _array(self, name: str, value: object) -> Array:
-        array = as_floats(name, value)  # type: ignore[arg-type]
-        if array.size != len(self._sensor):
-            raise BadInput(f"{name} have shape {array.shape}, expected {self._sensor.shape}")
+    def _fitting(self, name: str, array: NDArray[Any]) -> NDArray[Any]:
+        if array.shape not in ((len(self._sensor),), self._sensor.shape):
+            raise BadInput(f"{name} have shape {array.shape}, expected {self._sensor.shape}, or as many in a row")
         return array.reshape(-1)
+
+
+def _flags(value: object) -> NDArray[np.bool_]:
+    """`value` as an array of true and false; or BadInput."""
+    try:
+        array = np.asarray(value)
+    except Exception as error:  # whatever a stranger's __array__ raises
+        raise BadInput(f"valid is not an array of bool ({type(error).__name__})") from None
+    if array.dtype != np.bool_ or np.ma.is_masked(value):
+        raise BadInput(f"valid is of {array.dtype}, expected bool, none of them masked")
+    return array

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.field import DangerField
 from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
-from qpsafe.ranging.checks import check_clock, checked_sensors
+from qpsafe.ranging.checks import check_clock, checked_sensors, mounting
 from qpsafe.ranging.configurations import Configurations
 from qpsafe.ranging.inbox import Inbox
 from qpsafe.ranging.judge import Judge
@@ -25,7 +25,7 @@ from qpsafe.ranging.unseen import Together
 from qpsafe.ranging.watch import LATE, SensorWatch
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.body import surrounding_hulls
-from qpsafe.sensing.detection import BadInput
+from qpsafe.sensing.detection import BadInput, reals
 from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
@@ -67,12 +67,10 @@ class RangeSensing:
         self._rules = RangeRules() if rules is None else rules
         hulls = surrounding_hulls(robot, self.sensing.self_detection, known, carried)
         self._robot, count, links = robot, len(self.sensors), len(robot.wire_frames)
-        self._judges = [Judge(sensor) for sensor in self.sensors]
+        self._judges = [Judge(sensor, self.rules, self.sensing.tolerance) for sensor in self.sensors]
         self._watches = [SensorWatch(sensor, self.rules, self.sensing) for sensor in self.sensors]
         self._reducers = [Reducer(sensor, self.rules, self.sensing, hulls, links) for sensor in self.sensors]
-        self._mounts = [
-            (0, sensor.pose) if sensor.mount == WORLD else _mounted(robot, sensor) for sensor in self.sensors
-        ]
+        self._mounts = [mounting(robot, sensor) for sensor in self.sensors]
         room = 2 * links * self.rules.each
         self._store, self._counts = np.zeros((count, room, WIDTH)), np.zeros(count, dtype=np.int64)
         self._carriers = np.array([-1 if sensor.link is None else sensor.link for sensor in self.sensors])
@@ -100,11 +98,10 @@ class RangeSensing:
                 self.sensing.approach_speed,
                 total,
             )
-        self._hidden_places, self._looked = _NONE, False
         self._still = np.zeros((links * self.rules.each, 3))
-        self._past = Configurations(robot.nq)
-        self._most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
-        self._inbox = Inbox(self.sensors, self.rules.budget)
+        self._past = Configurations(robot.nq, float(self._patience.max()))
+        self.most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
+        self.inbox = Inbox(self.sensors, self.rules.budget)
         self._seen = np.zeros(count)
         self.reset()
 
@@ -143,9 +140,9 @@ class RangeSensing:
         self._counts[:] = 0
         if self._together is not None:
             self._together.reset()
-        self._hidden_places, self._looked = _NONE, False
+        self._hidden_places, self._looked, self._hidden_at = _NONE, False, 0.0
         self._past.reset()
-        self._inbox.reset()
+        self.inbox.reset()
         self.unseen: tuple[str, ...] = ()
         self.stopped = self._doubted = False
         self._now = -inf
@@ -156,7 +153,7 @@ class RangeSensing:
         """A person has looked: sensors that see again are trusted again, a stop they caused is lifted."""
         for watch in self._watches:
             watch.acknowledge(self._now)
-        self.stopped = sum(watch.dead for watch in self._watches) > self._most
+        self.stopped = sum(watch.dead for watch in self._watches) > self.most
 
     def update(
         self, images: Any, now: float, state: RobotState, field: Any, qd: Array, person: float = PERSON
@@ -174,7 +171,7 @@ class RangeSensing:
         Raises:
             BadInput: Too many sensors do not see; or the clock cannot tell how old anything is.
         """
-        self._now = check_clock(now, self._now)
+        now = self._now = check_clock(now, self._now)
         self._past.take(now, state.q)
         wire = state.wire(qd)
         notes = self._take_all(images, now, wire)
@@ -185,19 +182,23 @@ class RangeSensing:
             *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
         hidden = self._hidden(now, state, wire)
+        since = np.full(len(hidden), now - self._hidden_at)  # who may have stood there may have come since
         if not total:
-            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, np.zeros(len(hidden)), tuple(notes))
+            return Ranged(_NONE, _NO_LINKS, _NONE, hidden, since, tuple(notes))
         points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
         if moving:
             points, velocities = self._ahead(points, velocities, wire, field)
         danger, _ = field.evaluate(points, wire, velocities)
+        danger = reals("the field's value", danger, (total,))
         count = choose(
             points, links, velocities, self._who[:total], danger, self.rules.most, self.rules.apart,
             self._marks, self._used, *self._chosen,
         )  # fmt: skip
+        if count < 0:
+            raise BadInput("the danger of a seen point is not finite")
         near, leads = self._near[:total], self._leads[:total]
         if len(hidden):
-            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, np.zeros(len(hidden))))
+            near, leads = np.concatenate((near, hidden)), np.concatenate((leads, since))
         else:  # not our memory of the next tick
             near, leads = near.copy(), leads.copy()
         return Ranged(*[part[:count].copy() for part in self._chosen], near, leads, tuple(notes))
@@ -205,7 +206,8 @@ class RangeSensing:
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
         if self.rules.unseen == OCCUPIED and self._looked and self._together is not None:
-            self._hidden_places, self._looked = self._together.unseen(wire, state.body_poses(), now), False
+            places = self._together.unseen(wire, state.body_poses(), now)
+            self._hidden_places, self._looked, self._hidden_at = places, False, now
         return self._hidden_places
 
     def _ahead(self, points: Array, velocities: Array, wire: Wire, field: Any) -> tuple[Array, Array]:
@@ -217,7 +219,8 @@ class RangeSensing:
 
     def _take_all(self, images: Any, now: float, wire: Wire) -> list[str]:
         """Take the images that came, as many as there is time for; what is wrong, in words."""
-        taken, notes = self._inbox.take(images)
+        self.inbox.put(images)
+        taken, notes = self.inbox.take()
         for who, image in taken:
             try:
                 wrong = self._take(who, image, now, wire)
@@ -267,7 +270,7 @@ class RangeSensing:
         if self._begin:
             for watch in self._watches:
                 watch.begin = now
-            self._seen[:], self._begin, self._until = now, False, -inf
+            self._seen[:], self._begin, self._until = [watch.seen for watch in self._watches], False, -inf
         if not (self._doubted or now > self._until):
             return []
         self._until = float((self._seen + self._patience).min()) - _ROUNDING  # images that came since put it off
@@ -283,18 +286,12 @@ class RangeSensing:
         self.unseen, self._doubted = tuple(unseen), bool(unseen)
         if not unseen:
             return []
-        self.stopped |= sum(watch.dead for watch in self._watches) > self._most
+        self.stopped |= sum(watch.dead for watch in self._watches) > self.most
         notes = [f"range sensors {what}, unseen what is before them: {', '.join(who)}" for what, who in kinds.items()]
-        if self.stopped or len(unseen) > self._most:
+        if self.stopped or len(unseen) > self.most:
             more = "stopped until acknowledged" if self.stopped else "stopped until they see again"
-            raise BadInput("; ".join((f"more than {self._most} range sensors do not see: {more}", *notes)))
+            raise BadInput("; ".join((f"more than {self.most} range sensors do not see: {more}", *notes)))
         return notes
-
-
-def _mounted(robot: Robot, sensor: RangeSensor) -> tuple[int, Array]:
-    """The body that carries a sensor, and its pose on it."""
-    body, place = robot.mounting(sensor.mount)
-    return body, place @ sensor.pose
 
 
 _NONE, _NO_LINKS = np.empty((0, 3)), np.empty(0, dtype=np.int64)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.looking_kernel import AROUND
-from qpsafe.ranging.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile
+from qpsafe.ranging.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile, tile_sigma
 
 if TYPE_CHECKING:
     from qpsafe.ranging.judge import Usable
@@ -52,6 +53,9 @@ def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
     Args:
         sensor: Of many zones in rows and columns.
         most: How many zones it may have.
+
+    Raises:
+        ConfigurationError: What stands side by side in rows and columns does not look side by side.
     """
     rows, columns = sensor.shape
     size = 1
@@ -71,6 +75,10 @@ def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
             cone = pitch[top : top + size, left : left + size].ravel()
             angles.append(float((np.arccos(np.clip(part @ middle, -1.0, 1.0)) + cone).max()))
     shape = (-(-rows // size), -(-columns // size))
+    # half the diagonal of a square that is its share of a full sphere is 2.5 / sqrt(n)
+    if max(angles) >= min(5.0 * 2.5 / len(angles) ** 0.5 + float(pitch.max()), 0.25 * np.pi):
+        expected = f"rows and columns whose neighbours look side by side, as of all sensors of more than {most} zones"
+        raise ConfigurationError(f"RangeSensor {sensor.name!r}", "shape", sensor.shape, expected)
     return replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=shape), size
 
 
@@ -151,7 +159,11 @@ class Reducer:
         if self.size > 1:
             shape, nearest, known = image.shape, *self._tiles
             tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
-            sigma = np.full(len(nearest), float(sigma.max(initial=0.0)) if sigma.size > 1 else float(sigma[0]))
+            if sigma.strides[0] == 0:  # one number
+                sigma = np.full(len(nearest), sigma[0])
+            else:
+                spread, sigma = sigma.reshape(shape), np.empty(len(nearest))
+                tile_sigma(distances.reshape(shape), valid.reshape(shape), spread, self.size, nearest, sigma)
             distances, valid = nearest, known
         self.distances, self.valid, self.sigma = distances, valid, sigma
         count = reduce_zones(

@@ -154,7 +154,8 @@ def reduce_zones(
 def tile(distances: Array, valid: Array, size: int, support: int, nearest: Array, known: Array) -> None:
     """The nearest surface in each tile of a dense image: what `support` pixels see as near as that.
 
-    Fewer pixels are noise, or edges that mix what is before them with what is behind.
+    Fewer pixels are noise, or edges that mix what is before them with what is behind; only what reads less than nothing
+    is never that.
 
     Args:
         distances: Of the pixels (rows, columns) [m].
@@ -182,8 +183,31 @@ def tile(distances: Array, valid: Array, size: int, support: int, nearest: Array
                             b, c = c, b
                         if b < a:
                             a, b = b, a
-        nearest[i] = a if support == 1 else b if support == 2 else c if support == 3 else e
-        known[i] = count >= support
+        nearest[i] = a if support == 1 or a < 0.0 else b if support == 2 else c if support == 3 else e
+        known[i] = count >= support or a < 0.0
+
+
+@entry(
+    types.void(
+        readable(2), types.Array(types.boolean, 2, "A", readonly=True), readable(2), types.int64, readable(1), _out
+    )
+)  # fmt: skip
+def tile_sigma(distances: Array, valid: Array, sigma: Array, size: int, nearest: Array, spread: Array) -> None:
+    """How uncertain the surface in each tile is: as much as the worst of the pixels that are as near as it.
+
+    Args:
+        distances, valid, sigma: Of the pixels (rows, columns) [m].
+        size: Pixels along the edge of a tile.
+        nearest: Of the tiles, see `tile`.
+        spread: Filled, one a tile [m].
+    """
+    wide = (distances.shape[1] + size - 1) // size
+    spread[:] = 0.0
+    for y in range(distances.shape[0]):
+        for x in range(distances.shape[1]):
+            i = (y // size) * wide + x // size
+            if valid[y, x] and distances[y, x] <= nearest[i]:  # false for NaN
+                spread[i] = max(spread[i], sigma[y, x])
 
 
 def farthest_zone(size: int) -> int:

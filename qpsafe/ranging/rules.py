@@ -47,18 +47,17 @@ class RangeRules(Fixed):
         acceleration: float = 1.0, fastest: float = 2.5, unseen: str = FREE,
     ) -> None:  # fmt: skip
         whole = {
-            "most": (most, 1), "each": (each, 1), "few": (few, 1), "misplaced": (misplaced, 1), "dense": (dense, 64),
-            "support": (support, 1), "budget": (budget, 1),
+            "most": (most, 1, 10**9), "each": (each, 1, 100), "few": (few, 1, 10**9),
+            "misplaced": (misplaced, 1, 10**9), "dense": (dense, 64, 10**9), "support": (support, 1, 4),
+            "budget": (budget, 1, 10**9),
         }  # fmt: skip
-        for key, (count, least) in whole.items():
-            if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= 10**9:
-                raise ConfigurationError("RangeRules", key, count, f"a whole number >= {least}")
+        for key, (count, least, greatest) in whole.items():
+            if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= greatest:
+                raise ConfigurationError("RangeRules", key, count, f"a whole number from {least} to {greatest}")
             setattr(self, key, count)
-        if support > 4:
-            raise ConfigurationError("RangeRules", "support", support, "1 to 4 pixels")
         if not isinstance(predict, bool):
             raise ConfigurationError("RangeRules", "predict", predict, "True or False")
-        if unseen not in (FREE, OCCUPIED):
+        if not isinstance(unseen, str) or unseen not in (FREE, OCCUPIED):
             raise ConfigurationError("RangeRules", "unseen", unseen, f"{FREE} or {OCCUPIED}")
         self.predict, self.unseen = predict, unseen
         real = {

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.ranging.given import is_number, parts_of, rows_and_columns
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -83,18 +84,27 @@ class RangeSensor:
             object.__setattr__(self, key, array)
         for key, least in (("range_min", 0.0), ("sigma", 0.0), ("period", 1e-4)):
             value = getattr(self, key)
-            if not (_is_number(value) and least <= value < 1e3):
+            if not (is_number(value) and least <= value < 1e3):
                 self._refuse(key, value, f"a number >= {least:g}")
-        if not (_is_number(self.range_max) and self.range_min < self.range_max < 1e3):
+        if not isinstance(self.covers, bool):
+            self._refuse("covers", self.covers, "True or False")
+        if not (is_number(self.range_max) and self.range_min < self.range_max < 1e3):
             self._refuse("range_max", self.range_max, f"a distance > range_min = {self.range_min} [m]")
         if self.max_age is None:
             object.__setattr__(self, "max_age", 3.0 * self.period)
-        elif not (_is_number(self.max_age) and self.max_age > 0.0):
+        elif not (is_number(self.max_age) and self.max_age > 0.0):
             self._refuse("max_age", self.max_age, "a time > 0 [s]")
-        shape = (1, count) if self.shape == (0, 0) else self.shape
-        if not (len(shape) == 2 and shape[0] * shape[1] == count):
+        shape = rows_and_columns(self.shape)
+        shape = (1, count) if shape == (0, 0) else shape
+        if shape is None or min(shape) < 1 or shape[0] * shape[1] != count:
             self._refuse("shape", self.shape, f"rows and columns of {count} zones")
-        object.__setattr__(self, "shape", (int(shape[0]), int(shape[1])))
+        object.__setattr__(self, "shape", shape)
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Unpickled and copied arrays can be written to again."""
+        self.__dict__.update(state)
+        for array in (self.directions, self.half_angle, self.pose):
+            array.flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.directions)
@@ -115,7 +125,12 @@ class RangeSensor:
             field_of_view: From edge to edge along rows and columns, not along the diagonal [rad].
             parts: Other attributes.
         """
-        pitch = field_of_view / max(rows, columns)
+        whole, where = rows_and_columns((rows, columns)), f"RangeSensor {name!r}"
+        if whole is None or min(whole) < 1:
+            raise ConfigurationError(where, "rows, columns", (rows, columns), "whole numbers >= 1")
+        if not (is_number(field_of_view) and 0.0 < field_of_view < np.pi):
+            raise ConfigurationError(where, "field_of_view", field_of_view, "an angle > 0, below 180 degrees [rad]")
+        (rows, columns), pitch = whole, field_of_view / max(whole)
         across = np.tan(pitch * (np.arange(columns) - 0.5 * (columns - 1)))
         down = np.tan(pitch * (np.arange(rows) - 0.5 * (rows - 1)))
         y, x = np.meshgrid(down, across, indexing="ij")
@@ -137,11 +152,13 @@ class RangeSensor:
             intrinsics: fx, fy, cx, cy [pixels].
             parts: Other attributes.
         """
-        fx, fy, cx, cy = intrinsics
-        if not (np.isfinite(intrinsics).all() and fx > 0.0 and fy > 0.0):
-            raise ConfigurationError(
-                f"RangeSensor {name!r}", "intrinsics", intrinsics, "fx, fy > 0 and cx, cy [pixels]"
-            )
+        whole, where = rows_and_columns(shape), f"RangeSensor {name!r}"
+        if whole is None or min(whole) < 1:
+            raise ConfigurationError(where, "shape", shape, "rows and columns, whole numbers >= 1")
+        numbers = parts_of(intrinsics)
+        if not (len(numbers) == 4 and all(map(is_number, numbers)) and min(numbers[:2]) > 0.0):
+            raise ConfigurationError(where, "intrinsics", intrinsics, "fx, fy > 0 and cx, cy [pixels]")
+        shape, (fx, fy, cx, cy) = whole, numbers
         v, u = np.meshgrid(np.arange(shape[0], dtype=float), np.arange(shape[1], dtype=float), indexing="ij")
         directions = _units(np.stack(((u - cx) / fx, (v - cy) / fy, np.ones_like(u)), axis=-1))
         half = np.arctan(np.sqrt(0.5) / min(fx, fy))
@@ -158,8 +175,15 @@ class RangeSensor:
             count: Of rays.
             parts: Other attributes.
         """
-        angles = angle_min + increment * np.arange(count)
-        directions = np.stack((np.cos(angles), np.sin(angles), np.zeros(count)), axis=-1)
+        where = f"RangeSensor {name!r}"
+        for key, angle in (("angle_min", angle_min), ("increment", increment)):
+            if not is_number(angle):
+                raise ConfigurationError(where, key, angle, "an angle [rad]")
+        whole = rows_and_columns((1, count))
+        if whole is None or count < 1:
+            raise ConfigurationError(where, "count", count, "a whole number of rays >= 1")
+        angles = angle_min + increment * np.arange(whole[1])
+        directions = np.stack((np.cos(angles), np.sin(angles), np.zeros(whole[1])), axis=-1)
         return cls(name, directions, np.asarray(0.5 * abs(increment)), **parts)  # type: ignore[arg-type]
 
     @classmethod
@@ -197,7 +221,7 @@ class RangeSensor:
             pose: From `mount` to the sensor's frame (4, 4) [m].
             mount: Frame; the present one by default.
         """
-        return replace(self, pose=np.asarray(pose, dtype=float), mount=self.mount if mount is None else mount)
+        return replace(self, pose=pose, mount=self.mount if mount is None else mount)
 
     def same_zones(self, other: RangeSensor) -> bool:
         """Whether another sensor looks along the same directions with the same cones."""
@@ -206,6 +230,10 @@ class RangeSensor:
             and np.allclose(self.directions, other.directions, atol=1e-9, rtol=0.0)
             and np.allclose(self.half_angle, other.half_angle, atol=1e-9, rtol=0.0)
         )
+
+    def same_place(self, other: RangeSensor) -> bool:
+        """Whether another sensor is fixed where this one is."""
+        return self is other or (self.mount == other.mount and np.allclose(self.pose, other.pose, atol=1e-9, rtol=0.0))
 
     def check(self, robot: Robot) -> None:
         """Whether a robot's cell can hold this sensor.
@@ -224,7 +252,7 @@ class RangeSensor:
         try:
             array = np.asarray(getattr(self, key), dtype=np.float64)
             array = array if shape is None else array.reshape(shape)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             self._refuse(key, getattr(self, key), f"numbers of shape {shape}")
         if not np.isfinite(array).all():
             self._refuse(key, getattr(self, key), "finite numbers")
@@ -259,7 +287,3 @@ class RangeImage(NamedTuple):
 def _units(v: Array) -> Array:
     v = v.reshape(-1, 3)
     return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

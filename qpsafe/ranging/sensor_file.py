@@ -100,13 +100,18 @@ def load_range_sensors(robot: Robot | str | Path, sensors: str | Path = "vl53l5c
         ConfigurationError: The robot's folder has no such file; names those that it has.
         RobotFileError: The file is wrong, see `read_range_sensors`.
     """
+    where = "load_range_sensors"
     if isinstance(robot, str | Path):
         from qpsafe.robot.loader import load_robot
 
         robot = load_robot(robot)
+    if not hasattr(robot, "wire_frames"):
+        raise ConfigurationError(where, "robot", robot, "a Robot, or what load_robot finds it by")
+    if not isinstance(sensors, str | Path):
+        raise ConfigurationError(where, "sensors", sensors, "a sensor's name, or a path")
     for path in (robot.folder / PATTERN.format(sensors), robot.folder / sensors, Path(sensors)):
         if os.path.isfile(path):  # no error for names that no system can have
             return read_range_sensors(path, robot)
     known = ", ".join(range_sensor_files(robot)) or "none"
     expected = f"a file, or a sensor of which {robot.name} has a {PATTERN.format('SENSOR')}: {known}"
-    raise ConfigurationError("load_range_sensors", "sensors", str(sensors), expected)
+    raise ConfigurationError(where, "sensors", str(sensors), expected)

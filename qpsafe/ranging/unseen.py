@@ -81,7 +81,7 @@ class Together:
             counts: How many points each holds (s,).
         """
         reducer = self._reducers[who]
-        self.views[who] = View(stamp, pose, reducer.distances.copy(), reducer.valid.copy(), reducer.sigma)
+        self.views[who] = View(stamp, pose, reducer.distances.copy(), reducer.valid.copy(), reducer.sigma.copy())
         count = lost_before(store, counts, who, stamp, self._found)
         if count:
             sensors, rows = self._found[:count].T

@@ -111,8 +111,11 @@ class SensorWatch:
 
     @property
     def seen(self) -> float:
-        """Until when the sensor was known to see [s]: its last usable image, or when images were first waited for."""
-        return max(self.good, self.begin)
+        """Until when the sensor was known to see [s]: its last usable image, or when images were first waited for.
+
+        The one that came first may have been old already.
+        """
+        return self.good if self.good > -inf else self.begin
 
     def silent(self, now: float) -> bool:
         """Whether nothing usable has come for too long."""

@@ -64,6 +64,8 @@ def read_cell(path: str | Path) -> tuple[TomlText, CellFile]:
     Raises:
         ConfigurationError: Names file, line, key and value of what is wrong.
     """
+    if not isinstance(path, str | Path):
+        raise ConfigurationError("cell", "path", path, "the path of a TOML file")
     text = TomlText.read(Path(path))
     return text, text.checked(CellFile, _is_key)
 

@@ -154,3 +154,27 @@ def as_floats(name: str, value: ArrayLike) -> NDArray[np.float64]:
         raise BadInput(f"{name} has masked values")
     with np.errstate(over="ignore"):  # long double beyond float64 becomes infinite
         return np.array(array, dtype=np.float64)
+
+
+def reals(whose: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """What a part of another making answered, as float64 of this shape; its own array if it may be.
+
+    Args:
+        whose: What a person calls it, for the error.
+        value: What came.
+        shape: That is expected.
+
+    Raises:
+        TypeError: Text, something complex, masked or no numbers at all.
+        ValueError: Another shape.
+    """
+    array = value
+    if not (type(array) is np.ndarray and array.dtype == _FLOAT):
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or np.ma.is_masked(value):
+            what = "of masked values" if array.dtype.kind in "fiu" else f"of {array.dtype}"
+            raise TypeError(f"{whose} is not an array of real numbers but {what}")
+        array = array.astype(float)
+    if array.shape != shape:
+        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
+    return array

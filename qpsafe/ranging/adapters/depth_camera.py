@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.ranging.adapters.raw import numbers, says_nothing
+from qpsafe.ranging.adapters.raw import check_sensor, numbers, says_nothing
+from qpsafe.ranging.given import is_number
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 
 Array = NDArray[np.float64]
@@ -39,12 +40,13 @@ class DepthCamera:
     _stretch: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_sensor("DepthCamera", self.sensor)
         ahead = self.sensor.directions[:, 2]
         if not ahead.min() > 1e-3:
             raise ConfigurationError("DepthCamera", "sensor", self.sensor, "zones before the camera, z > 0")
-        if not 0.0 < self.scale < np.inf:
+        if not (is_number(self.scale) and self.scale > 0.0):
             raise ConfigurationError("DepthCamera", "scale", self.scale, "a length > 0 [m]")
-        if self.sigma_1m is not None and not 0.0 <= self.sigma_1m < np.inf:
+        if self.sigma_1m is not None and not (is_number(self.sigma_1m) and self.sigma_1m >= 0.0):
             raise ConfigurationError("DepthCamera", "sigma_1m", self.sigma_1m, "a length >= 0 [m]")
         object.__setattr__(self, "_stretch", self.scale / ahead)
 

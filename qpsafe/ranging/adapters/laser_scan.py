@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.ranging.adapters.raw import numbers, says_nothing
+from qpsafe.ranging.adapters.raw import check_sensor, numbers, says_nothing
+from qpsafe.ranging.given import is_number, parts_of
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 
 Array = NDArray[np.float64]
@@ -37,11 +38,14 @@ class LaserScanner:
     range_max: float | None = None
 
     def __post_init__(self) -> None:
+        check_sensor("LaserScanner", self.sensor)
         for key in ("range_min", "range_max"):
             if getattr(self, key) is None:
                 object.__setattr__(self, key, getattr(self.sensor, key))
+            if not is_number(getattr(self, key)):
+                raise ConfigurationError("LaserScanner", key, getattr(self, key), "a finite distance [m]")
         least, most = self._range
-        if not 0.0 <= least < most < np.inf:
+        if not 0.0 <= least < most:
             raise ConfigurationError("LaserScanner", "range_max", most, f"a distance > range_min = {least} [m]")
 
     @property
@@ -63,17 +67,20 @@ class LaserScanner:
         Raises:
             ConfigurationError: Names the field that is missing, or the part that is wrong.
         """
-        fields = {}
+        where, fields = f"LaserScanner {name!r}", {"scan_time": getattr(scan, "scan_time", 0.0)}
         for key in ("angle_min", "angle_increment", "range_min", "range_max", "ranges"):
             if not hasattr(scan, key):
-                raise ConfigurationError(f"LaserScanner {name!r}", key, scan, "a field of the scan")
+                raise ConfigurationError(where, key, scan, "a field of the scan")
             fields[key] = getattr(scan, key)
+        for key, value in fields.items():
+            if key != "ranges" and not is_number(value):
+                raise ConfigurationError(where, key, value, "a finite number")
         least, most = float(fields["range_min"]), float(fields["range_max"])
         figures: dict[str, object] = {"range_min": least, "range_max": min(most, 25.0)}
-        if getattr(scan, "scan_time", 0.0) > 0.0:
-            figures["period"] = float(scan.scan_time)
+        if fields["scan_time"] > 0.0:
+            figures["period"] = float(fields["scan_time"])
         sensor = RangeSensor.planar(
-            name, float(fields["angle_min"]), float(fields["angle_increment"]), len(fields["ranges"]),
+            name, float(fields["angle_min"]), float(fields["angle_increment"]), len(parts_of(fields["ranges"])),
             **(figures | parts),
         )  # fmt: skip
         return cls(sensor, least, most)
@@ -105,7 +112,7 @@ class LaserScanner:
         try:
             rays = np.array([0, len(self.sensor) // 2, len(self.sensor) - 1])
             angles = float(scan.angle_min) + float(scan.angle_increment) * rays
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             return False
         ahead = self.sensor.directions[rays, :2]
         return bool((np.abs(np.stack((np.cos(angles), np.sin(angles)), axis=1) - ahead) <= 1e-3).all())
@@ -118,5 +125,5 @@ def _stamp(scan: Any) -> float:
         if hasattr(stamp, "nanosec"):
             return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
         return float(stamp.to_sec()) if hasattr(stamp, "to_sec") else float("nan")
-    except (TypeError, ValueError):
+    except Exception:  # whatever a stranger's stamp raises
         return float("nan")

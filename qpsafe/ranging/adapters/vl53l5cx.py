@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.ranging.adapters.raw import numbers, says_nothing
+from qpsafe.ranging.adapters.raw import check_sensor, numbers, says_nothing
+from qpsafe.ranging.given import parts_of
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def vl53l5cx(name: str, zones: int = 8, **parts: object) -> RangeSensor:
     Raises:
         ConfigurationError: Another number of zones, or a part that is wrong.
     """
-    if zones not in (4, 8):
+    if not isinstance(zones, int) or zones not in (4, 8):
         raise ConfigurationError(f"vl53l5cx {name!r}", "zones", zones, "4 or 8")
     figures: dict[str, object] = {"range_min": 0.02, "range_max": 4.0, "sigma": 0.02}
     figures["period"] = 1.0 / 15.0 if zones == 8 else 1.0 / 60.0
@@ -75,15 +76,18 @@ class Vl53l5cx:
     _scale: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_sensor("Vl53l5cx", self.sensor)
         rows, columns = self.sensor.shape
         for key, value, known in (("order", self.order, ORDERS), ("along", self.along, MEASURES)):
-            if value not in known:
+            if not isinstance(value, str) or value not in known:
                 raise ConfigurationError("Vl53l5cx", key, value, f"one of {', '.join(known)}")
         if (rows, columns) not in ((4, 4), (8, 8)):
             raise ConfigurationError("Vl53l5cx", "sensor", self.sensor, "4x4 or 8x8 zones")
-        if NO_TARGET in self.valid or not all(isinstance(status, int) for status in self.valid):
+        valid = parts_of(self.valid)
+        if not (valid and all(isinstance(status, int) for status in valid)) or NO_TARGET in valid:
             raise ConfigurationError("Vl53l5cx", "valid", self.valid, "statuses of a range, whole numbers, not 255")
         zones = np.arange(rows * columns).reshape(rows, columns)
+        object.__setattr__(self, "valid", valid)
         object.__setattr__(self, "_zones", (zones[:, ::-1] if self.order == "driver" else zones).ravel())
         lean = self.sensor.directions[:, 2] if self.along == "axis" else np.ones(rows * columns)
         object.__setattr__(self, "_scale", 1e-3 / lean)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,7 +80,7 @@ def _table(path: Path) -> dict[str, Any]:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {key: file[key] for key in file.files}
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as problem:
+    except Exception as problem:  # of a broken file: whatever zip, its methods and NumPy raise
         raise ConfigurationError(path, "file", str(problem)[:200], "an .npz file without Python objects") from None
 
 
@@ -97,7 +96,7 @@ def _numbers(path: Path, table: dict[str, Any], key: str, ndim: int) -> Any:
 def _distances(path: Path, table: dict[str, Any], sensor: RangeSensor) -> Array:
     if "distances" in table:
         found = table["distances"]
-        found = found.reshape(len(found), -1) if found.ndim == 3 else found
+        found = found.reshape(len(found), np.prod(found.shape[1:])) if found.ndim == 3 else found
         found = _numbers(path, {"distances": found}, "distances", 2).astype(np.float64)
         if found.shape[1] != len(sensor):
             raise ConfigurationError(path, "distances", found.shape, f"(images, {len(sensor)} zones)")
@@ -108,9 +107,11 @@ def _distances(path: Path, table: dict[str, Any], sensor: RangeSensor) -> Array:
         ahead = sensor.directions[:, 2]
         if not ahead.min() > 1e-3:
             raise ConfigurationError(path, "depth", sensor.name, "distances: its zones are not all ahead of it")
-        flat = depth.reshape(len(depth), -1)
-        scale = 1.0 if flat.dtype.kind == "f" else float(np.asarray(table.get("scale", SCALE)).ravel()[0])
-        found = np.where(flat > 0, flat * scale, np.nan) / ahead
+        flat = depth.reshape(len(depth), len(sensor))
+        scale = np.asarray(table.get("scale", SCALE))
+        if scale.dtype.kind not in "fui" or scale.size != 1 or not 0.0 < scale.item() < np.inf:
+            raise ConfigurationError(path, "scale", str(scale)[:200], "one number > 0 [m]")
+        found = np.where(flat > 0, flat * (1.0 if flat.dtype.kind == "f" else scale.item()), np.nan) / ahead
     found[~(found >= 0.0)] = np.nan
     found[found > sensor.range_max] = np.inf
     return np.asarray(found)
@@ -123,9 +124,9 @@ def _joints(path: Path, table: dict[str, Any], robot: Robot, images: int) -> Arr
     if "q_stamps" in table:
         times = _numbers(path, table, "q_stamps", 1).astype(np.float64)
         stamps = _numbers(path, table, "stamps", 1).astype(np.float64)
-        if len(times) != len(q) or not (np.diff(times) > 0.0).all():
+        if not len(times) or len(times) != len(q) or not (np.diff(times) > 0.0).all():
             raise ConfigurationError(path, "q_stamps", f"{len(times)} times", f"{len(q)} that grow [s]")
-        if len(stamps) != images or not (times[0] <= stamps.min() and stamps.max() <= times[-1]):
+        if not len(stamps) or len(stamps) != images or not (times[0] <= stamps.min() and stamps.max() <= times[-1]):
             raise ConfigurationError(path, "stamps", f"{len(stamps)} times", f"{images}, between those of q [s]")
         q = np.stack([np.interp(stamps, times, q[:, j]) for j in range(robot.nq)], axis=-1)
     if len(q) != images:

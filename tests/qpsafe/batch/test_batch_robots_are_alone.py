@@ -192,3 +192,10 @@ def test_mistakes_are_named(controller: Any, key: str, value: Any) -> None:
 def test_masks_that_are_none_are_named(controller: Any, mask: Any) -> None:
     with pytest.raises(ConfigurationError, match="mask"):
         qpsafe.BatchController(controller, 2).reset(mask)
+
+
+def test_a_controller_that_sees_by_images_is_refused(controller: Any) -> None:
+    """A batch takes none: its robots went on, and saw nothing."""
+    sensors = qpsafe.load_range_sensors(controller.robot)
+    with pytest.raises(ConfigurationError, match="range_sensors"):
+        qpsafe.BatchController(qpsafe.SafetyController(controller.robot, controller.tasks, range_sensors=sensors), 2)

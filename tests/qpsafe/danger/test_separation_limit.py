@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 import qpsafe
 from qpsafe.danger.link_parts import LinkParts
 from qpsafe.danger.separation import Separation
-from qpsafe.danger.separation_limit import SeparationLimit, kept_apart, oldest
+from qpsafe.danger.separation_limit import MOST, SeparationLimit, kept_apart, nearest_first, oldest
 from qpsafe.errors import ConfigurationError
 from qpsafe.gate.pack import robot_capsules
 from qpsafe.limits import JointLimits
@@ -264,3 +264,57 @@ def test_a_batch_keeps_links_apart_as_single_controllers_do():
         tick = controller.step(q[0], qd[0], points=[point])
         q, qd = ticks.q, ticks.qd
         assert (ticks.qd == tick.reference.qd).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@given(st.integers(0, 10**6))
+@settings(max_examples=8)
+def test_however_much_is_seen_a_robot_at_rest_approaches_none_of_it_too_fast(name, seed):
+    """With a row for every part and point, a tick took gigabytes."""
+    robot, rng = ROBOTS[name], np.random.default_rng(seed)
+    controller = controller_with(robot, figures=Separation(2.0, reaction_time=rng.uniform(0.0, 0.3)))
+    wire = robot.wire(robot.home, np.zeros(robot.nq))
+    count = int(rng.choice([1, 30, 300, 900]))
+    link, share = rng.integers(0, len(wire.starts), count), rng.random((count, 1))
+    away = rng.normal(size=(count, 3))
+    away *= rng.uniform(0.1, 0.6, (count, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
+    points = wire.starts[link] + share * (wire.ends[link] - wire.starts[link]) + away
+    tick = controller.step(robot.home, np.zeros(robot.nq), points=points)
+    assert tick.status == "ok"
+    level = controller.separation.level(
+        robot.at(robot.home), PARTS[name], points, qd=np.zeros(robot.nq), limits=controller.limits
+    )
+    assert level is None or len(level.upper) <= MOST
+    distances, A = PARTS[name].approaches(robot.at(robot.home), points)
+    most = controller.separation.separation.speed(distances, controller.dt)
+    assert (A @ tick.reference.qd <= most + 1e-8).all()
+
+
+@given(st.integers(0, 10**6), st.integers(1, 40))
+def test_the_nearest_of_every_part_come_first(seed, most):
+    rng = np.random.default_rng(seed)
+    rows = np.flatnonzero(rng.random(60) < 0.7)
+    parts, gaps = rows // 12, rng.random(len(rows))
+    kept, left = nearest_first(rows, parts, gaps, most)
+    assert np.array_equal(np.sort(np.concatenate((kept, left))), rows)
+    assert len(kept) == min(most, len(rows))
+    assert (np.diff(kept) > 0).all()
+    for part in range(5):
+        mine = parts == part
+        inside, outside = np.isin(rows, kept) & mine, np.isin(rows, left) & mine
+        assert not outside.any() or gaps[inside].max(initial=0.0) <= gaps[outside].min()
+    counts = [np.isin(rows[parts == part], kept).sum() for part in range(5)]
+    assert all(counts[part] == (parts == part).sum() for part in range(5) if counts[part] < max(counts) - 1)
+
+
+@given(st.integers(0, 10**6), st.floats(0.0, 0.3))
+@settings(max_examples=20)
+def test_what_somebody_may_have_come_counts_as_distance(seed, come):
+    """However fast people are: errors of places are no times."""
+    rng = np.random.default_rng(seed)
+    q, _ = some_state(ROBOT, rng)
+    points, age = rng.uniform(-0.5, 0.5, (4, 3)) + np.array([0.3, 0.0, 0.6]), rng.uniform(0.0, 0.2)
+    for v_h in (0.0, 0.3, 1.6):
+        figures = Separation(2.0, person_speed=v_h)
+        level = SeparationLimit(figures).level(ROBOT.at(q), PARTS["irb140"], points, age, come=come)
+        assert np.allclose(level.upper, figures.speed(level.gaps - max(v_h * age, come)), atol=1e-12)

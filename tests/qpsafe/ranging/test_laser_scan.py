@@ -90,3 +90,27 @@ def test_a_scanner_is_described_by_its_message() -> None:
         LaserScanner.of("x", SimpleNamespace(angle_min=0.0))
     with pytest.raises(ConfigurationError, match="range_max"):
         LaserScanner(sensor, range_min=2.0, range_max=1.0)
+
+
+class Raises:
+    """A message of another making: whatever it is asked raises."""
+
+    def __init__(self, error: type[Exception]) -> None:
+        self._error = error
+
+    def __array__(self, *_: object, **__: object) -> object:
+        raise self._error
+
+    def to_sec(self) -> float:
+        raise self._error
+
+
+@pytest.mark.parametrize("error", [RuntimeError, OverflowError, ZeroDivisionError, KeyError])
+def test_scans_that_raise_tell_nothing(error: type[Exception]) -> None:
+    scanner = LaserScanner(RangeSensor.planar("scanner", -1.0, 0.1, 20))
+    usual = {"angle_min": -1.0, "angle_increment": 0.1, "ranges": np.ones(20)}
+    assert not np.any(scanner.image(Raises(error), stamp=0.0).valid)
+    assert not np.any(scanner.image(SimpleNamespace(**usual | {"ranges": Raises(error)}), stamp=0.0).valid)
+    assert not np.any(scanner.image(SimpleNamespace(**usual | {"angle_min": 10**400}), stamp=0.0).valid)
+    header = SimpleNamespace(stamp=Raises(error))
+    assert np.isnan(scanner.image(SimpleNamespace(**usual, header=header)).stamp)

@@ -78,3 +78,32 @@ def test_behind_things_somebody_may_stand_if_that_is_asked_for(run: Any, eyes: A
             found[rules.unseen, name] = int(beyond.sum())
     assert found["free", "nothing"] == found["free", "board"] == 0
     assert found["occupied", "board"] > found["occupied", "nothing"] + 20
+
+
+@pytest.mark.parametrize(("spots", "arrays"), [(0, 0), (4, 1), (4, 2), (3, 2), (3, 3), (1, 5), (0, 5), (5, 0)])
+def test_too_many_that_do_not_see_are_too_many_of_whatever_kind(run: Any, eyes: Any, spots: int, arrays: int) -> None:
+    """A fifth of 20 spots and 5 arrays together, and of the spots alone."""
+    pose = eyes.looking((0.2, 0.0, 0.6), (1.6, 0.3, 0.9))
+    sensors = [RangeSensor.array(f"array {i}", pose=pose) for i in range(5)]
+    loop = run(range_sensors=sensors)
+    read = np.where(np.arange(20) < spots, np.nan, np.inf)
+    for k in range(70):
+        images = [s.image(np.full(64, np.inf), stamp=k * 0.004) for s in sensors[arrays:]] if k % 10 == 0 else []
+        tick = loop.feed(loop.q, loop.qd, read, images=images)
+    assert len(tick.unseen) == spots + arrays
+    stops = spots > 4 or spots + arrays > 5
+    assert tick.status == ("bad_input" if stops else "degraded" if spots + arrays else "ok")
+
+
+def test_who_stood_where_nobody_looks_may_have_come_since(run: Any, eyes: Any) -> None:
+    """Places are asked for when an image comes, and are as old as that until the next one."""
+    camera = RangeSensor.array("camera", 24, 24, np.radians(60.0), pose=eyes.looking((0.4, 0.0, 0.6), (1.6, 0.0, 0.6)))
+    read = eyes.seen(camera, camera.pose, [(1.1, 0.1 * y, 0.1 * z, 0.12) for y in range(-4, 5) for z in range(1, 11)])
+    loop = run(spots="off", range_sensors=[camera], ranging=RangeRules(unseen="occupied"))
+    update, told = loop.controller.ranging.update, []
+    loop.controller.ranging.update = lambda *given: told.append(update(*given)) or told[-1]
+    for k in range(12):
+        loop.feed(loop.q, loop.qd, images=[camera.image(read, stamp=k * DT)] if k % 5 == 0 else [], now=k * DT)
+        hidden = len(told[-1].near) - loop.controller.ranging._counts.sum()
+        assert hidden > 20
+        assert np.allclose(told[-1].leads[-hidden:], (k % 5) * DT)

@@ -15,6 +15,7 @@ from qpsafe.ranging.sensor import RangeImage, RangeSensor
 from qpsafe.sensing.hulls import Obstacle
 
 DT = 0.004
+UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.01], [0.0, 0.0, 0.0, 1.0]])
 TABLE = Obstacle.box("table", (1.6, 1.2, 0.1), (0.9, 0.0, -0.15))
 
 
@@ -69,14 +70,33 @@ SICK: dict[str, tuple[Callable[[RangeSensor, np.ndarray, int, Any], RangeImage],
     "text": (lambda s, d, k, _: s.image(["far"] * 64, stamp=k * DT), "not an array of real numbers"),
     "sigma not a number": (lambda s, d, k, _: s.image(d, stamp=k * DT, sigma=np.nan), "sigma"),
     "valid no bool": (lambda s, d, k, _: s.image(d, stamp=k * DT, valid=np.ones(64)), "valid"),
+    "valid in rows of different lengths": (
+        lambda s, d, k, _: s.image(d, stamp=k * DT, valid=[[True], [True, False]]), "valid",
+    ),
+    "valid masked": (
+        lambda s, d, k, _: s.image(d, stamp=k * DT, valid=np.ma.array(np.ones(64, dtype=bool), mask=True)), "masked",
+    ),
+    "sigma in rows of different lengths": (
+        lambda s, d, k, _: s.image(d, stamp=k * DT, sigma=[[0.1], [0.1, 0.2]]), "sigma",
+    ),
+    "sigma in millimetres": (lambda s, d, k, _: s.image(d, stamp=k * DT, sigma=5.0), "blind"),
+    "stamp beyond numbers": (lambda s, d, k, _: s.image(d, stamp=10**400), "not finite"),
+    "rows for columns": (lambda s, d, k, _: s.image(d.reshape(4, 16), stamp=k * DT), "shape"),
     "wrong intrinsics": (
         lambda s, d, k, _: RangeSensor.array("array", field_of_view=1.0, pose=s.pose).image(d, stamp=k * DT),
         "zones are others",
     ),
+    "of a sensor elsewhere": (
+        lambda s, d, k, _: s.placed(UP @ s.pose).image(d, stamp=k * DT),
+        "elsewhere",
+    ),
+    "of a sensor on another frame": (
+        lambda s, d, k, _: s.placed(s.pose, "dh3").image(d, stamp=k * DT), "elsewhere",
+    ),
     "sees through": (lambda s, d, k, _: s.image(np.full(64, 3.5), stamp=k * DT), "sees through"),
     "nothing where something is": (lambda s, d, k, _: s.image(np.full(64, np.inf), stamp=k * DT), "sees through"),
     "shifted by a row": (lambda s, d, k, _: s.image(np.roll(d, 8), stamp=k * DT), "sees through"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", SICK)

@@ -1,5 +1,6 @@
 """Recordings are read from a file or a folder, in metres or in units, and what is wrong is named."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -140,3 +141,36 @@ def test_a_pose_is_put_into_the_text_and_nothing_else_changes(tmp_path: Path, nu
     # where there was none
     path.write_text(with_pose(with_pose(CELL.format(first="", second=""), 0, pose), 1, pose))
     assert [camera.pose == pytest.approx(pose, abs=1e-5) for camera in load_cameras(path)] == [True, True]
+
+
+ALTERED: dict[str, dict[str, Any]] = {
+    "scale in words": {"scale": "mm"}, "scale nothing": {"scale": np.empty(0)}, "scale none": {"scale": np.nan},
+    "scale zero": {"scale": 0.0}, "scales": {"scale": [0.001, 0.001]},
+    "no times": {"q": np.empty((0, 6)), "q_stamps": np.empty(0), "stamps": np.zeros(6)},
+    "no stamps": {"q_stamps": np.arange(6.0), "stamps": np.empty(0)},
+    "stamps of no number": {"q_stamps": np.arange(6.0), "stamps": np.full(6, np.nan)},
+    "nothing": {"q": np.empty((0, 6)), "depth": np.empty((0, 6, 8))},
+    "no axes": {"depth": 1.0}, "distances of no axes": {"distances": 1.0}, "text": {"depth": np.full((6, 6, 8), "x")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ALTERED)
+def test_what_is_wrong_in_a_recording_is_named(tmp_path: Path, robot: Any, what: str) -> None:
+    usual = {"q": np.zeros((6, 6)), "depth": np.full((6, 6, 8), 900, dtype=np.uint16)}
+    np.savez(tmp_path / "r.npz", **(usual | ALTERED[what]))
+    with pytest.raises(ConfigurationError, match=r"r\.npz"):
+        load_recording(tmp_path / "r.npz", SENSOR, robot)
+
+
+def test_a_recording_with_broken_bytes_is_named_or_read(tmp_path: Path, robot: Any) -> None:
+    rng = np.random.default_rng(0)
+    path = tmp_path / "r.npz"
+    np.savez_compressed(path, q=rng.normal(size=(6, 6)), depth=rng.integers(300, 3000, (6, 6, 8)).astype(np.uint16))
+    whole = path.read_bytes()
+    for _ in range(300):
+        broken = bytearray(whole)
+        for place in rng.integers(0, len(whole), int(rng.integers(1, 4))).tolist():
+            broken[place] = int(rng.integers(0, 256))
+        path.write_bytes(bytes(broken[: int(rng.integers(1, len(whole) + 1))] if rng.random() < 0.3 else broken))
+        with suppress(ConfigurationError):
+            load_recording(path, SENSOR, robot)
