@@ -221,7 +221,8 @@ class RangeSensor:
             pose: From `mount` to the sensor's frame (4, 4) [m].
             mount: Frame; the present one by default.
         """
-        return replace(self, pose=pose, mount=self.mount if mount is None else mount)
+        mount = self.mount if mount is None else mount
+        return replace(self, pose=pose, mount=mount)  # type: ignore[arg-type]  # made an array there, or refused
 
     def same_zones(self, other: RangeSensor) -> bool:
         """Whether another sensor looks along the same directions with the same cones."""
