@@ -280,7 +280,8 @@ def test_however_much_is_seen_a_robot_at_rest_approaches_none_of_it_too_fast(nam
     away *= rng.uniform(0.1, 0.6, (count, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
     points = wire.starts[link] + share * (wire.ends[link] - wire.starts[link]) + away
     tick = controller.step(robot.home, np.zeros(robot.nq), points=points)
-    assert tick.status == "ok"
+    # so many rows may be ill-conditioned for the law, which says so: they are kept all the same
+    assert tick.status == "ok" or tick.messages == ("law: ill-conditioned",)
     level = controller.separation.level(
         robot.at(robot.home), PARTS[name], points, qd=np.zeros(robot.nq), limits=controller.limits
     )
