@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -153,7 +154,7 @@ def add(
     for note in robot.notes:
         screen.print(f"note: {note}", style="yellow")
     size = f"{counted(again.nq, 'joint')}, {counted(len(again.wire_frames), 'link')}"
-    screen.print(f"{again.name}: {size}, see `qpsafe robots {folder}`")
+    screen.print(f"{again.name}: {size}, see `qpsafe robots {shlex.quote(str(folder))}`", soft_wrap=True)
 
 
 def _load(name: str) -> Robot:

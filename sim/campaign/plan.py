@@ -72,6 +72,8 @@ class Plan:
 
     def __post_init__(self) -> None:
         sensor_kinds(self.sensor)
+        if isinstance(self.lag, bool) or not isinstance(self.lag, int | float):
+            raise ConfigurationError("Plan", "lag", self.lag, "a number [s]")
         if not 0.0 <= self.lag <= LONGEST_LAG:
             raise ConfigurationError("Plan", "lag", self.lag, f"0 to {LONGEST_LAG} s")
         if abs(self.lag - DT * round(self.lag / DT)) > 1e-9:  # a servo would round it
@@ -82,8 +84,13 @@ class Plan:
                 raise ConfigurationError("Plan", key, value, f"a whole number from {least} to {most}")
         for key in ("motions", "controllers"):
             names = getattr(self, key)
-            if not isinstance(names, tuple) or not names or len(set(names)) < len(names):
+            words = isinstance(names, tuple) and names and all(isinstance(name, str) for name in names)
+            if not words or len(set(names)) < len(names):
                 raise ConfigurationError("Plan", key, names, "a tuple of at least one name, none of them twice")
+        for key in ("robot", "people", "cell"):
+            value = getattr(self, key)
+            if not isinstance(value, str) and (value is not None or key == "robot"):
+                raise ConfigurationError("Plan", key, value, "a name or a path, as text")
         for motion in self.motions:
             if motion not in MOTIONS and not (motion.endswith(".toml") and Path(motion).is_file()):
                 expected = f"{', '.join(MOTIONS)}, or a program's file that is there"

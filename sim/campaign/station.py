@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -233,26 +233,19 @@ class Station:
         Measured in the robot's model: every joint brakes at its acceleration limit; a_s = v²/(2 s) of the points of the
         wire that go at least half as fast as the fastest one, s the way they take to rest.
         """
-        rng = np.random.default_rng(7)
-        return min(stopped(self.robot, q, qd) for q, qd in self._moments(rng))
+        return min(stopped(self.robot, q, qd) for q, qd in self._moving or self._pushed())
 
     @cached_property
     def speed(self) -> float:
-        """Of the fastest end of the wire in the nominal motion; 0 where there is none [m/s]."""
-        if self.program is None:
-            return 0.0
-        return max(float(wire_speeds(self.robot, q, qd).max()) for q, qd in self._moments(np.random.default_rng(7)))
+        """Of the fastest end of the wire in the nominal motion [m/s]; 0 where it never exceeds 0.1 m/s."""
+        return max((float(wire_speeds(self.robot, q, qd).max()) for q, qd in self._moving), default=0.0)
 
-    def _moments(self, rng: np.random.Generator) -> Sequence[tuple[Array, Array]]:
-        """Configurations and joint velocities from which the robot may have to stop."""
-        robot = self.robot
+    @cached_property
+    def _moving(self) -> Sequence[tuple[Array, Array]]:
+        """Configurations and joint velocities in the motion; none where it stands, or is slow."""
         if self.program is None:
-            found = []
-            for _ in range(60):
-                wild = rng.normal(size=robot.nq) * robot.max_velocity
-                found.append((robot.home, 0.5 / wire_speeds(robot, robot.home, wild).max() * wild))
-            return found
-        frame, found = robot.tool_frames[0], []
+            return []
+        robot, frame, found = self.robot, self.robot.tool_frames[0], []
         q: Array = self.start
         for t in np.arange(0.0, min(self.program.duration, 20.0), 0.1):
             sample = self.program.sample(float(t))
@@ -261,6 +254,13 @@ class Station:
             if wire_speeds(robot, q, qd).max() > 0.1:
                 found.append((q, qd))
         return found
+
+    def _pushed(self) -> Iterator[tuple[Array, Array]]:
+        """The start at 0.5 m/s, whatever way: from where evasion may have to stop."""
+        robot, rng = self.robot, np.random.default_rng(7)
+        for _ in range(60):
+            wild = rng.normal(size=robot.nq) * robot.max_velocity
+            yield self.start, 0.5 / wire_speeds(robot, self.start, wild).max() * wild
 
 
 @cache

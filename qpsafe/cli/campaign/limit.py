@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -122,7 +123,7 @@ def _folder(folder: Path, controller: str, search: dict[str, Any], screen: Conso
         print_json({"controller": controller, **said, "trials": [item.to_dict() for item in found]})
         return
     _show_summary(controller, said, screen)
-    screen.print(f"into the report: qpsafe campaign report {folder}", soft_wrap=True)
+    screen.print(f"into the report: qpsafe campaign report {shlex.quote(str(folder))}", soft_wrap=True)
 
 
 def _show_summary(controller: str, said: dict[str, Any], screen: Console) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -110,7 +111,8 @@ def _kept(folder: Path | None, screen: Console) -> Iterator[None]:
         elif any(folder.glob("trials-*.parquet")):
             text = f"finished trials are kept in {folder}: the same command goes on there"
             screen.print(text, style="yellow")
-            screen.print(f"to judge what there is: qpsafe campaign report {folder}", style="yellow")
+            text = f"to judge what there is: qpsafe campaign report {shlex.quote(str(folder))}"
+            screen.print(text, style="yellow", soft_wrap=True)
         raise
 
 

@@ -138,4 +138,4 @@ def _show_cases(found: Found, file: Path, controller: str, screen: Console) -> N
         screen.print(sheet)
     screen.print(found.sentence)
     if sheet.rows:
-        screen.print(f"to see the first one: qpsafe campaign show {shlex.quote(str(file))}#0")
+        screen.print(f"to see the first one: qpsafe campaign show {shlex.quote(str(file))}#0", soft_wrap=True)

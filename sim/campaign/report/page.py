@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -35,7 +36,8 @@ def show_command(plan: Plan, trial: int, controller: str) -> str:
         trial: Its number.
         controller: Who is to be seen.
     """
-    return f"qpsafe campaign show {trial} --controller {controller} {plan.options(('trials', 'controllers'))}".rstrip()
+    options = plan.options(("trials", "controllers"))
+    return f"qpsafe campaign show {trial} --controller {shlex.quote(controller)} {options}".rstrip()
 
 
 def _sections(results: Results, found: dict[str, Any]) -> Iterator[Html]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -213,6 +214,19 @@ def test_what_ends_it_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert json.loads(campaign("report", "kept", "--json").stdout)["trials"] == {"finished": 8, "planned": 12}
     assert "It is not finished: 8 of 12 trials." in (tmp_path / "kept" / "report.html").read_text(encoding="utf-8")
     assert "12 of 12" in campaign(*FEW, "--out", "kept").output
+
+
+@pytest.mark.parametrize("name", ["kept", "my run", "Größe $(x) & y", "it's"])
+def test_the_command_that_is_told_can_be_typed_whatever_the_folder_is_called(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(plan: Plan, trial: int) -> list[dict[str, Any]]:
+        return made_up_trials.run(plan, trial) if trial < 9 else [1 / 0]  # type: ignore[list-item]
+
+    folder = "a folder " * 12 + name  # longer than a line: the command is not broken
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: failing)
+    line = next(line for line in campaign(*FEW, "--out", folder).output.splitlines() if line.startswith("to judge"))
+    assert shlex.split(line)[-4:] == ["qpsafe", "campaign", "report", folder]
 
 
 # Stopped and killed

@@ -78,6 +78,14 @@ def test_a_lag_is_played_as_it_was_asked_or_refused(lag: float) -> None:
             Plan(lag=lag)
 
 
+@pytest.mark.parametrize("key", [field.name for field in dataclasses.fields(Plan)])
+@pytest.mark.parametrize("value", [7.5, True, b"x", ["hold"], (["hold"],), (3,), {}, object()])
+def test_a_value_of_another_kind_is_named(key: str, value: object) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        Plan(**{key: value})  # type: ignore[arg-type]
+    assert refused.value.key == key
+
+
 def test_a_digest_changes_with_all_that_decides_rows_and_with_nothing_else() -> None:
     plan = Plan()
     others = {

@@ -1,6 +1,7 @@
 """Opponents keep what they promise: stops stand before they are touched, scaling nears nobody faster than v_max."""
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,32 @@ def tracks(speed: float) -> PersonTracks:
 def played(name: str, motion: str, speed: float) -> Recording:
     place = station("irb140", motion)
     return record(place, opponent(name), Senses(place, tracks(speed), "ideal", 0), TICKS)
+
+
+WAIT = '[[segment]]\ndo = "dwell"\ntime = {}\n'
+LIFT = "[rates]\nspeed = {}\n[points.up]\nposition = [0.453, 0.0, 0.6]\n"
+LINE = '[[segment]]\ndo = "line"\nto = "up"\n'
+
+
+@pytest.mark.parametrize(
+    ("program", "moves"),
+    [
+        (WAIT.format(1.0), False),
+        (LIFT.format(0.02) + LINE, False),
+        (LIFT.format(0.3) + WAIT.format(25.0) + LINE, False),  # not in the time that is looked at
+        (LIFT.format(0.3) + LINE, True),
+    ],
+)
+def test_a_program_that_stands_is_slow_or_waits_can_be_stopped_as_a_held_pose_can(
+    program: str, moves: bool, tmp_path: Path
+) -> None:
+    file = tmp_path / "program.toml"
+    file.write_text(program)
+    place, held = station("irb140", str(file)), station("irb140", "hold")
+    assert place.deceleration > 0.0
+    assert (place.speed > 0.1) is moves
+    if not moves:
+        assert (place.deceleration, place.speed) == (held.deceleration, 0.0)
 
 
 @pytest.mark.parametrize("speed", [1.0, 1.6])
