@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.text.words import call
@@ -54,7 +56,11 @@ class VerifiedMotion(Fixed):
             except (TypeError, ValueError, OverflowError):
                 number = math.nan
             enough = number > 0.0 if positive else number >= 0.0
-            if isinstance(value, bool) or not enough or not (number < math.inf or key == "sidestep"):
+            if (
+                isinstance(value, str | bytes | bool | np.bool_)
+                or not enough
+                or not (number < math.inf or key == "sidestep")
+            ):
                 kind = "number" if key == "sidestep" else "finite number"
                 raise ConfigurationError("VerifiedMotion", key, value, f"a {kind} {'> 0' if positive else '>= 0'}")
             setattr(self, key, number)

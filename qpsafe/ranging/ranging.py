@@ -201,7 +201,8 @@ class RangeSensing:
             near, leads = np.concatenate((near, hidden)), np.concatenate((leads, since))
         else:  # not our memory of the next tick
             near, leads = near.copy(), leads.copy()
-        return Ranged(*[part[:count].copy() for part in self._chosen], near, leads, tuple(notes))
+        where, on, how = self._chosen
+        return Ranged(where[:count].copy(), on[:count].copy(), how[:count].copy(), near, leads, tuple(notes))
 
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""

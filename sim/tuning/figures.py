@@ -43,13 +43,9 @@ def front_figure(said: Mapping[str, Any]) -> Figure:
     axis.plot(*_places([now], now), "X", color="#c0392b", markersize=9, label="present values")
     axis.plot(*_places([said["chosen"]], now), "*", color=_CHOSEN, markersize=13, label="chosen")
     axis.set(xlabel="work lost an encounter, less the present values' [s]", ylabel="harm, less the present values'")
-    xs, ys = _places(counted, start)
-    for limits, values, more in zip(
-        (axis.set_xlim, axis.set_ylim), (xs, ys), _places([*best, *finalists], now), strict=True
-    ):
-        values = [0.0, *values, *more]
-        room = 0.08 * (max(values) - min(values)) or 1e-3
-        limits(min(values) - room, max(values) + room)  # early stops far outside are not shown
+    (xs, ys), (more_xs, more_ys) = _places(counted, start), _places([*best, *finalists], now)
+    axis.set_xlim(*_room([0.0, *xs, *more_xs]))  # early stops far outside are not shown
+    axis.set_ylim(*_room([0.0, *ys, *more_ys]))
     legend_below(figure, axis, 3)
     return figure
 
@@ -70,6 +66,13 @@ def sensitivity_figure(shares: Mapping[str, Mapping[str, float]]) -> Figure:
         axis.grid(axis="y", visible=False)
         axis.set(xlabel="share [%]", title=title)
     return figure
+
+
+def _room(values: Sequence[float]) -> tuple[float, float]:
+    """Limits of an axis that shows values."""
+    low, high = min(values), max(values)
+    room = 0.08 * (high - low) or 1e-3
+    return low - room, high + room
 
 
 def _place(point: Mapping[str, Any], start: Mapping[str, Any]) -> tuple[float, float]:

@@ -56,7 +56,7 @@ def write_values(file: Path, robot: Robot, values: Values, run: str) -> None:
     Raises:
         ConfigurationError: The file is written in a way that cannot be edited; it is as it was then.
     """
-    before = file.read_text(encoding="utf-8")
+    before = file.read_text(encoding="utf-8-sig")  # some editors begin with a mark
     text = edited(before, _in_units(before, robot, values), f"{MARK} {run}")
     if text is None:
         expected = "tables [danger], [evasion], [recovery], [sensing] and [gate] with a line of its own for each key"

@@ -98,11 +98,9 @@ def test_figures_are_exchanged_from_one_tick_to_the_next() -> None:
     key=st.sampled_from(
         ("person_speed", "latency", "servo_lag", "person_error", "approach", "margin", "sidestep", "escape")
     ),
-    value=st.sampled_from((-1.0, math.nan, math.inf, "1", None, True)),
+    value=st.sampled_from((-1.0, math.nan, math.inf, "1", b"1", "one", None, True, np.True_, [], 10**400)),
 )
 def test_figures_that_are_none_are_refused_by_name(key: str, value: object) -> None:
-    if value == "1":
-        value = "one"
     if (key, value) == ("sidestep", math.inf):  # the strictest promise
         assert VerifiedMotion(sidestep=math.inf).sidestep == math.inf
         return
