@@ -16,7 +16,7 @@ from noted import DATA
 
 from qpsafe.text.json_text import json_text
 
-KEPT = ("robot", "run", "sentence", "present", "chosen", "front", "judgement", "sensitivity", "search")
+KEPT = ("robot", "run", "sentence", "present", "chosen", "front", "finals", "judgement", "sensitivity", "search")
 
 
 def short(said: dict[str, Any]) -> dict[str, Any]:

@@ -127,6 +127,23 @@ def campaign() -> list[str]:
     ]
 
 
+def tune() -> list[str]:
+    run = measured("tune")["runs"][0]
+    (now, *others), means = run["finals"]["finalists"], run["judgement"]["means"]
+    tried, number = {trial["number"]: trial for trial in run["trials"]}, run["chosen"]["number"]
+    searched = {one["number"]: tried[one["number"]]["harm"] - tried[0]["harm"] for one in others}
+    assert all(one["harm"] - now["harm"] > searched[one["number"]] for one in others)
+    assert min([now, *others], key=lambda one: one["harm"]) is now
+    (chosen,) = (one for one in others if one["number"] == number)
+    assert not run["judgement"]["worth"]
+    return [
+        f"harm {chosen['harm'] - now['harm']:+.4f} and work lost {chosen['lost'] - now['lost']:+.2f} s there",
+        f"{means['harm']['value']:+.4f} and {means['lost']['value']:+.2f} s in the judgement",
+        f"seemed to cost {searched[number]:+.4f}",
+        f"All {len(others)} finalists did more harm",
+    ]
+
+
 def check() -> list[str]:
     found = measured("check")
     since = found["trouble"].split("not kept from ")[1].removesuffix(" on")
@@ -197,6 +214,7 @@ PAGES: dict[str, Callable[[], list[str]]] = {
     "explanation/barrier.md": barrier,
     "explanation/campaign-people.md": people,
     "explanation/campaign.md": campaign,
+    "how-to/tune.md": tune,
     "explanation/demo-fixed.md": fixed,
     "explanation/demo-path.md": path,
     "explanation/demo-pick-and-place.md": pick,
