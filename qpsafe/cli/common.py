@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
@@ -228,3 +229,26 @@ def write_text(path: Path, text: str) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def refuse_idle(context: typer.Context, needs: Mapping[str, tuple[str, ...]]) -> None:
+    """Refuse options that were typed and would do nothing: they count only together with another one.
+
+    Args:
+        context: Of the command.
+        needs: The option that has to be on, as it is typed, and the names of the parameters that count with it only.
+
+    Raises:
+        ConfigurationError: One of these was typed while that is off.
+    """
+    parameters = {parameter.name: parameter for parameter in context.command.params}
+    options: dict[str, Any] = {word: p for p in context.command.params for word in (*p.opts, *p.secondary_opts)}
+    for switch, names in needs.items():
+        wanted = options[switch]
+        # "--no-x" is on where x is False
+        on = bool(context.params[wanted.name]) is (switch in wanted.opts)
+        for name in names:
+            typed = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+            if typed and not on:
+                option, value = parameters[name].opts[0], context.params[name]
+                raise ConfigurationError(context.command_path, option, value, f"only together with {switch}")

@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json
+from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json, refuse_idle
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
@@ -33,6 +33,15 @@ class Experiment(StrEnum):
     pick_and_place = "pick-and-place"
 
 
+#: Options that count with another one only.
+_NEEDS = {
+    "--web": ("web_host", "web_port", "web_token"),
+    "--sensors": ("sensor_host", "sensor_port"),
+    "--real-time": ("priority",),
+    "--program": ("unchecked",),
+}
+
+
 class Acknowledge(StrEnum):
     """What lifts a stop that the robot itself made."""
 
@@ -41,6 +50,7 @@ class Acknowledge(StrEnum):
 
 
 def stream(
+    context: typer.Context,
     robot: RobotName = "irb140",
     host: Annotated[str, typer.Option(help="Address or interface that the robot sends to.")] = ("127.0.0.1"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6510,
@@ -102,6 +112,7 @@ def stream(
 
     No safety function: keep the robot's own stops and limits independent of this program. SIGUSR1 acknowledges a stop.
     """
+    refuse_idle(context, _NEEDS)
     from qpsafe.irc5 import realtime
     from qpsafe.irc5.outlet import Outlet
     from qpsafe.irc5.requests import Requests

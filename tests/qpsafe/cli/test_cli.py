@@ -20,6 +20,7 @@ from qpsafe.errors import QpsafeError
 from qpsafe.sim.recording.run_file import read_run
 
 run = CliRunner().invoke
+WEB = (("port", "9000"), ("host", "127.0.0.2"), ("token", "abc"))
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
 
 
@@ -246,3 +247,20 @@ def test_inspecting_a_bare_model_says_what_was_assumed() -> None:
     assert "note:" in result.stdout
     shown = json.loads(run(app, ["robots", str(load_robot("irb140").model_path), "--json"]).stdout)
     assert any("speed" in note for note in shown["notes"])
+
+
+@pytest.mark.parametrize(
+    ("typed", "switch"),
+    [
+        *((["stream", f"--web-{name}", value], "--web") for name, value in WEB),
+        *((["replay", "run.npz", f"--web-{name}", value], "--web") for name, value in WEB),
+        (["stream", "--priority", "5"], "--real-time"),
+        (["stream", "--no-sensors", "--sensor-port", "7000"], "--sensors"),
+        (["stream", "--unchecked"], "--program"),
+    ],
+)
+def test_an_option_that_would_do_nothing_is_refused(typed: list[str], switch: str) -> None:
+    result = run(app, typed)
+    assert isinstance(result.exception, QpsafeError), result.output
+    assert f"{typed[-2] if len(typed) > 2 else typed[-1]} = " in str(result.exception)
+    assert str(result.exception).endswith(f"expected only together with {switch}")
