@@ -74,7 +74,7 @@ class RangeSensing:
         room = 2 * links * self.rules.each
         self._store, self._counts = np.zeros((count, room, WIDTH)), np.zeros(count, dtype=np.int64)
         self._carriers = np.array([-1 if sensor.link is None else sensor.link for sensor in self.sensors])
-        self._patience = np.array([sensor.max_age for sensor in self.sensors], dtype=np.float64)
+        self._patience = np.array([sensor.patience for sensor in self.sensors])
         self._numbers = np.array([
             0.0, self.sensing.hold_time, self.sensing.approach_speed, self.sensing.d_min, PERSON, AHEAD,
             self.rules.acceleration, self.rules.fastest,

@@ -41,7 +41,7 @@ class RangeSensor:
         shape: Rows and columns of the zones; (1, z) where they have no order.
         covers: Whether a zone that reads "nothing" says that its cone is free up to `range_max`.
         max_age: An image that is older is stale, and a sensor without a newer one is silent [s]; three periods where
-            it is None.
+            it is None, see `patience`.
 
     Raises:
         ConfigurationError: Names the attribute that is wrong.
@@ -90,9 +90,7 @@ class RangeSensor:
             self._refuse("covers", self.covers, "True or False")
         if not (is_number(self.range_max) and self.range_min < self.range_max < 1e3):
             self._refuse("range_max", self.range_max, f"a distance > range_min = {self.range_min} [m]")
-        if self.max_age is None:
-            object.__setattr__(self, "max_age", 3.0 * self.period)
-        elif not (is_number(self.max_age) and self.max_age > 0.0):
+        if self.max_age is not None and not (is_number(self.max_age) and self.max_age > 0.0):
             self._refuse("max_age", self.max_age, "a time > 0 [s]")
         shape = rows_and_columns(self.shape)
         shape = (1, count) if shape == (0, 0) else shape
@@ -105,6 +103,11 @@ class RangeSensor:
         self.__dict__.update(state)
         for array in (self.directions, self.half_angle, self.pose):
             array.flags.writeable = False
+
+    @property
+    def patience(self) -> float:
+        """How old an image may be [s]: `max_age`, or three periods."""
+        return 3.0 * self.period if self.max_age is None else self.max_age
 
     def __len__(self) -> int:
         return len(self.directions)

@@ -47,7 +47,7 @@ class SensorWatch:
 
     def __init__(self, sensor: RangeSensor, rules: RangeRules, sensing: SensingRules) -> None:
         self._sensor, self._rules, self._sensing = sensor, rules, sensing
-        self._patience = float(sensor.max_age or 0.0)
+        self._patience = sensor.patience
         self.reset()
 
     def reset(self) -> None:

@@ -132,3 +132,12 @@ def test_a_copied_sensor_is_the_same_and_stays_so(way: Callable[[Any], Any]) -> 
     for key in ("directions", "half_angle", "pose"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(other, key)[:] = 0.0
+
+
+@given(st.floats(1e-3, 1.0), st.floats(1e-3, 1.0), st.none() | st.floats(1e-3, 3.0))
+def test_another_period_is_another_patience_unless_that_was_given(
+    first: float, second: float, age: float | None
+) -> None:
+    changed = replace(replace(ARRAY, period=first, max_age=age), period=second)
+    assert changed.patience == (3.0 * second if age is None else age)
+    assert changed.max_age == age

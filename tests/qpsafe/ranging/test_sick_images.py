@@ -136,7 +136,7 @@ def test_a_clock_that_stands_or_tells_nothing_is_told(run: Any, array: RangeSens
 def test_silence_is_told(run: Any, array: RangeSensor) -> None:
     rng, read = np.random.default_rng(2), table(array)
     ticks = play(run, array, lambda k: [array.image(noisy(read, rng), stamp=k * DT)] if k == 0 else [], 120)
-    patience = round(array.max_age / DT)  # type: ignore[operator]
+    patience = round(array.patience / DT)
     assert all(tick.status == "ok" for tick in ticks[: patience + 1])
     assert all(tick.status == "bad_input" and tick.unseen for tick in ticks[patience + 2 :])
     never = play(run, array, lambda k: [], 120)
