@@ -272,8 +272,9 @@ def of_tuning(screen: Console, folder: Path) -> None:
     front = [{"number": number, "harm": 12.3456, "lost": 123.456} for number in (0, 17, 2999)]
     shares = {name: dict.fromkeys((f"{table} {HOSTILE}" for table in "abcdef"), 1.0) for name in ("harm", "lost")}
     for faults in ([], [HOSTILE]):
-        said = {"front": front, "present": front[0], "chosen": front[1], "sensitivity": shares, "sentence": HOSTILE,
-                "judgement": {"new_faults": faults}}  # fmt: skip
+        finals = {"encounters": [7_005_000, 7_005_971], "finalists": front} if faults else None
+        said = {"front": front, "finals": finals, "present": front[0], "chosen": front[1], "sensitivity": shares,
+                "sentence": HOSTILE, "judgement": {"new_faults": faults}}  # fmt: skip
         tune._show(said, screen)
 
 
@@ -344,7 +345,8 @@ def test_every_table_is_whole_on_a_narrow_screen(
     assert sheets
     for sheet in sheets:
         assert whole(sheet, width) in text
-    assert max(map(cell_len, text.splitlines())) <= width
+    # a command that one types again is in one piece, however long its folder is called
+    assert max(cell_len(line) for line in text.splitlines() if "qpsafe campaign show " not in line) <= width
 
 
 def _recording(make: Callable[[bool], Console], sheets: list[Sheet], json: bool) -> Console:
