@@ -33,6 +33,8 @@ def front_figure(said: Mapping[str, Any]) -> Figure:
         ("all encounters", _WHOLE, counted),
     )
     for label, colour, mine in kinds:
+        if not mine:
+            continue
         axis.plot(*_places(mine, start), "o", color=colour, markersize=3.5, label=label)
     for there in finalists:
         (x0, x1), (y0, y1) = zip(_place(trials[there["number"]], start), _place(there, now), strict=True)
