@@ -16,6 +16,18 @@ _LONGEST_VALUE = 400  # of a value in it
 class QpsafeError(Exception):
     """Base class of every error that qpsafe raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As it is, whatever made it: an error of a worker process that cannot be unpickled breaks the whole pool."""
+        return _again, (type(self), self.args, dict(vars(self)))
+
+
+def _again(kind: type[QpsafeError], args: tuple[Any, ...], state: dict[str, Any]) -> QpsafeError:
+    """An error that was pickled."""
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(state)
+    return error
+
 
 def in_words(error: BaseException, kind: bool = True) -> str:
     """The message of an error, with the name of its class; never raises, even where a foreign class's own methods do.
@@ -59,10 +71,6 @@ class ConfigurationError(QpsafeError, ValueError):
         self.value = value
         self.expected = expected
         super().__init__(f"{self.where}: {key} = {_shown(value)}: expected {expected}")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """All arguments, so that an error in a worker process arrives as it is; else the whole pool would break."""
-        return type(self), (self.where, self.key, self.value, self.expected)
 
 
 def _shown(value: object) -> str:

@@ -28,9 +28,6 @@ class StepProblem(QpsafeError, ValueError):
         self.person, self.keys, self.value, self.expected = person, list(keys), value, expected
         super().__init__(f"person {person}: {keys} = {value!r}: expected {expected}")
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.person, self.keys, self.value, self.expected)
-
 
 class Taken(NamedTuple):
     """A step as planned: from when to when [s], what, and the number of the step in the file."""

@@ -198,13 +198,21 @@ def test_errors_are_one_family() -> None:
     assert str(error) == "a.toml: key = 3: expected a number < 2"
 
 
+#: Modules that have errors of their own.
+ERRORS = (
+    "tasks.program_file", "tasks.reach", "irc5.records.log", "irc5.messages", "sim.stories.file",
+    "sim.stories.planning", "sim.campaign.runner", "sim.campaign.rows", "sim.campaign.executors",
+    "sim.world.plant", "sim.recording.run_file", "sim.irc5.udp", "sim.drawing.film",
+)  # fmt: skip
+
+
 def kinds_of(error: type[qpsafe.QpsafeError]) -> list[type[qpsafe.QpsafeError]]:
     return [error, *(kind for child in error.__subclasses__() for kind in kinds_of(child))]
 
 
 def test_errors_come_out_of_another_process_as_they_went_in() -> None:
     """Of every kind; one that cannot be unpickled would break the pool, which looks as if a process had died."""
-    for name in ("tasks.program_file", "sim.stories.file", "sim.stories.planning", "sim.campaign.runner"):
+    for name in ERRORS:
         importlib.import_module(f"qpsafe.{name}")
     for kind in kinds_of(qpsafe.QpsafeError):
         code = getattr(kind.__init__, "__code__", None)  # none of those that take but a text
