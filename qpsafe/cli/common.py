@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -231,24 +231,19 @@ def write_text(path: Path, text: str) -> None:
         part.unlink(missing_ok=True)
 
 
-def refuse_idle(context: typer.Context, needs: Mapping[str, tuple[str, ...]]) -> None:
-    """Refuse options that were typed and would do nothing: they count only together with another one.
+def refuse_idle(context: typer.Context, switch: str) -> None:
+    """Refuse options that were typed and would do nothing: `--web-port` and the like count together with `--web` only.
 
     Args:
         context: Of the command.
-        needs: The option that has to be on, as it is typed, and the names of the parameters that count with it only.
+        switch: Name of the option that has to be on, with which the names of the others begin.
 
     Raises:
         ConfigurationError: One of these was typed while that is off.
     """
-    parameters = {parameter.name: parameter for parameter in context.command.params}
-    options: dict[str, Any] = {word: p for p in context.command.params for word in (*p.opts, *p.secondary_opts)}
-    for switch, names in needs.items():
-        wanted = options[switch]
-        # "--no-x" is on where x is False
-        on = bool(context.params[wanted.name]) is (switch in wanted.opts)
-        for name in names:
-            typed = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
-            if typed and not on:
-                option, value = parameters[name].opts[0], context.params[name]
-                raise ConfigurationError(context.command_path, option, value, f"only together with {switch}")
+    for parameter in context.command.params if not context.params[switch] else ():
+        name = str(parameter.name)
+        typed = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
+        if typed and name.startswith(f"{switch}_"):
+            option, value = parameter.opts[0], context.params[name]
+            raise ConfigurationError(context.command_path, option, value, f"only together with --{switch}")

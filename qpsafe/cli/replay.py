@@ -40,7 +40,7 @@ def replay(
     Exit code 0 if all are the same, 1 at the first bit that differs: which tick, which answer, by how much, and which
     versions or robot files have changed since.
     """
-    refuse_idle(context, {"--web": ("web_host", "web_port", "web_token")})
+    refuse_idle(context, "web")
     screen = console(json)
     if web:
         from qpsafe.sim.web.server import check_port, need_viser

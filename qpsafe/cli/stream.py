@@ -33,15 +33,6 @@ class Experiment(StrEnum):
     pick_and_place = "pick-and-place"
 
 
-#: Options that count with another one only.
-_NEEDS = {
-    "--web": ("web_host", "web_port", "web_token"),
-    "--sensors": ("sensor_host", "sensor_port"),
-    "--real-time": ("priority",),
-    "--program": ("unchecked",),
-}
-
-
 class Acknowledge(StrEnum):
     """What lifts a stop that the robot itself made."""
 
@@ -112,7 +103,7 @@ def stream(
 
     No safety function: keep the robot's own stops and limits independent of this program. SIGUSR1 acknowledges a stop.
     """
-    refuse_idle(context, _NEEDS)
+    refuse_idle(context, "web")
     from qpsafe.irc5 import realtime
     from qpsafe.irc5.outlet import Outlet
     from qpsafe.irc5.requests import Requests
