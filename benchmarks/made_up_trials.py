@@ -6,6 +6,7 @@ No robot and nobody is simulated: a controller has a probability of contact and 
 from __future__ import annotations
 
 import os
+import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,8 @@ MANNERS = {
     "paper": (0.18, 0.6, 0.00, 3.6, 0.04),
     "default": (0.15, 0.5, 0.00, 3.2, 0.05),
 }
+#: Options of a command that plays some of them.
+FEW = ["--trials", "12", "--workers", "1", "--controllers", "none,stop,default"]
 PARTS = ("torso", "head", "upper_arm", "forearm", "hand", "thigh")
 LIMITS = {"torso": 1.6, "head": 0.11, "upper_arm": 1.5, "forearm": 1.3, "hand": 0.49, "thigh": 1.9}
 
@@ -134,3 +137,8 @@ def row(plan: Plan, trial: int, name: str, luck: float, unseen: bool) -> dict[st
         }
     values["search"] = values["energy_share"] if contact else -max(distance, 0.0)
     return values
+
+
+def without_times(report: str) -> str:
+    """A report, HTML or JSON, without what differs between two runs of the same trials."""
+    return re.sub(r'"engine": \{.*?\}|<p class="soft" id="times">.*?</p>', "", report, flags=re.DOTALL)

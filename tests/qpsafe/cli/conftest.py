@@ -7,15 +7,20 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import made_up_trials
 import pytest
 from rich.cells import cell_len
 from rich.console import Console
+from typer.testing import CliRunner
 
-from qpsafe.cli.main import main
+from qpsafe.cli.main import app, main
 from qpsafe.cli.sheet import Sheet
+from qpsafe.sim.campaign.speed import Speed
 from qpsafe.sim.drawing.gl import gl_available
+from qpsafe.text.json_text import json_text
 
 
 @pytest.fixture(scope="session")
@@ -56,6 +61,21 @@ def without_display(
     gl_available.cache_clear()
     for number, handler in handlers.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def campaign(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Any]:
+    """`qpsafe campaign` with some words, in a current folder of its own; trials are made up, none is simulated."""
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: made_up_trials.run)
+    monkeypatch.setattr("qpsafe.sim.campaign.speed.engine_speed", lambda plan, trials: Speed(100.0, 90.0, float("nan")))
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: CliRunner().invoke(app, ["campaign", *words])
+
+
+@pytest.fixture
+def plain_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take most of a command's time; tests/sim/campaign looks at the page."""
+    monkeypatch.setattr("qpsafe.sim.campaign.report.page.report_page", lambda results, found: json_text(found))
 
 
 def _whole(sheet: Sheet, width: int) -> str:
