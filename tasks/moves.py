@@ -53,6 +53,9 @@ class Line(Fixed):
         name = type(self).__name__
         self.start, self.goal = checked_pose(name, "start", start), checked_pose(name, "goal", goal)
         self._turn = log3(self.goal[:3, :3] @ self.start[:3, :3].T)
+        self._turns = bool(self._turn.any())
+        self._pose = self.start.copy()
+        self._pose[3] = 0.0, 0.0, 0.0, 1.0  # to the last bit
         self._shift = self.goal[:3, 3] - self.start[:3, 3]
         #: Length of the path [m], and the angle by which the orientation turns [rad].
         self.length, self.angle = self._length(), float(np.linalg.norm(self._turn))
@@ -71,11 +74,14 @@ class Line(Fixed):
 
     def sample(self, t: float) -> Sample:
         """Reference at time t [s]."""
-        u, du, _ = (float(value[0]) for value in self.law.at(t))
-        pose = np.eye(4)
-        pose[:3, :3] = exp3(u * self._turn) @ self.start[:3, :3]
-        pose[:3, 3], tangent = self._place(u)
-        return Sample(pose, du * np.concatenate((tangent, self._turn)))
+        u, du, _ = self.law.first(t)
+        pose, twist = self._pose.copy(), np.empty(6)
+        if self._turns:
+            pose[:3, :3] = exp3(u * self._turn) @ self.start[:3, :3]
+        pose[:3, 3], twist[:3] = self._place(u)
+        twist[3:] = self._turn
+        twist *= du
+        return Sample(pose, twist)
 
     def _length(self) -> float:
         return float(np.linalg.norm(self._shift))
@@ -122,9 +128,9 @@ class Arc(Line):
         self.centre = a + np.cross(float(u @ u) * v - float(v @ v) * u, normal) / (2.0 * area)
         self._arm = a - self.centre
         self.radius = float(np.linalg.norm(self._arm))
-        self._axis = normal / math.sqrt(area)
-        side = np.cross(self._axis, self._arm)
-        self._angle = math.atan2(float((c - self.centre) @ side), float((c - self.centre) @ self._arm)) % (2 * math.pi)
+        self._side = np.cross(normal / math.sqrt(area), self._arm)
+        x, y = float((c - self.centre) @ self._arm), float((c - self.centre) @ self._side)
+        self._angle = math.atan2(y, x) % (2 * math.pi)
         super().__init__(start, goal, linear, angular)
 
     def _length(self) -> float:
@@ -135,8 +141,9 @@ class Arc(Line):
         return Rates(speed, linear.acceleration, linear.jerk)
 
     def _place(self, u: float) -> tuple[Array, Array]:
-        arm = exp3(u * self._angle * self._axis) @ self._arm
-        return self.centre + arm, self._angle * np.cross(self._axis, arm)
+        # r = c + a cos φ + b sin φ with φ = u Φ, b across a in the plane of the circle
+        c, s = math.cos(u * self._angle), math.sin(u * self._angle)
+        return self.centre + c * self._arm + s * self._side, self._angle * (c * self._side - s * self._arm)
 
 
 class Dwell(Fixed):

@@ -135,6 +135,10 @@ class TimeLaw(Fixed):
             return Motion(self.goal, np.zeros(len(self.goal)), np.zeros(len(self.goal)))
         return Motion(*np.array([piece.at(max(t, 0.0)) for piece in self._pieces]).T)
 
+    def first(self, t: float) -> tuple[float, float, float]:
+        """Position, velocity and acceleration of the first coordinate at time t [s], as `at` has them."""
+        return self._pieces[0].at(max(t, 0.0)) if t < self.duration else (float(self.goal[0]), 0.0, 0.0)
+
 
 def _phases(profile: object) -> tuple[list[float], list[float]]:
     """Durations and jerks of a ruckig profile: at most two of braking into the limits, then seven."""

@@ -58,6 +58,8 @@ def test_a_time_law_leads_from_any_state_to_rest_within_its_rates(data: st.DataO
     assert just_before.position == pytest.approx(goal, abs=1e-6)
     assert just_before.velocity == pytest.approx(np.zeros(n), abs=1e-6)
     assert (law.at(law.duration).position == goal).all()
+    for t in np.append(np.linspace(-0.1, 1.1, 13) * law.duration, law.duration):  # one coordinate alone
+        assert law.first(t) == tuple(float(value[0]) for value in law.at(t))
     times = np.linspace(0.0, law.duration, 200)
     states = [law.at(t) for t in times]
     # |v| can pass the bound by v² while the start's acceleration a is taken back: a²/2j = 2²/40
