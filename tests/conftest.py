@@ -1,6 +1,7 @@
-"""Settings of hypothesis, the order of files, and one compilation for all processes of a run.
+"""Settings of hypothesis, how much is drawn, the order of files, and one compilation for all processes of a run.
 
-Hypothesis has no deadlines, since machines are shared; in CI it tries the same examples every time.
+Hypothesis has no deadlines, since machines are shared; in CI it tries the same examples every time. Where slow tests
+are left out, others draw less, see benchmarks/amounts.py.
 """
 
 import importlib
@@ -8,6 +9,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+import amounts
 import pytest
 from hypothesis import settings
 
@@ -18,22 +20,20 @@ try:
 except ImportError:  # not on Windows
     fcntl = None  # type: ignore[assignment]
 
-settings.register_profile("local", deadline=None)
-settings.register_profile("ci", deadline=None, derandomize=True)
-settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 #: The longest first: processes that take file after file then end together.
 LONGEST = (
-    "test_real_campaign.py",
     "test_tutorials.py",
-    "test_placement_nodes.py",
     "test_docs.py",
+    "test_batch_against_controllers.py",
+    "test_fixed_experiment.py",
+    "test_web_live.py",
     "test_cli.py",
     "test_campaign_command.py",
-    "test_fixed_experiment.py",
-    "test_path_experiment.py",
-    "test_check.py",
     "test_pick_place.py",
+    "test_check.py",
+    "test_path_experiment.py",
+    "test_controller_bad_data.py",
 )
 
 
@@ -44,7 +44,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let one process after another make the kernels ready: from an empty cache all would compile every one at once."""
+    """Say how much is drawn; let one process after another make the kernels ready: from an empty cache all would
+    compile every one at once.
+    """
+    os.environ[amounts.VARIABLE] = amounts.FEW if "not slow" in config.option.markexpr else amounts.ALL
+    settings.register_profile(
+        "here", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=amounts.some(30, 100)
+    )
+    settings.load_profile("here")
     if hasattr(config, "workerinput") and fcntl is not None:
         with Path(__file__).open("rb") as here, suppress(ImportError):  # whatever cannot be imported, tests tell
             fcntl.flock(here, fcntl.LOCK_EX)

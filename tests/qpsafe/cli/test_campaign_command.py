@@ -11,6 +11,7 @@ from typing import Any
 
 import made_up_trials
 import pytest
+from amounts import crossed
 from made_up_trials import FEW, without_times
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
@@ -136,8 +137,10 @@ def test_what_cannot_be_asked_is_named_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("command", [[], ["show", "1"], ["limit", "1"], ["worst", "stop"]])
-@pytest.mark.parametrize("option", ["--people", "--cell", "--motions"])
+@pytest.mark.parametrize(
+    ("command", "option"),
+    crossed([[], ["show", "1"], ["limit", "1"], ["worst", "stop"]], ["--people", "--cell", "--motions"]),
+)
 @pytest.mark.parametrize("text", ["speed = 3", "[[box]", '[[person]]\nname = "A"'])
 def test_a_wrong_file_is_named_with_its_line_before_anything_begins(
     campaign: Campaign, command: list[str], option: str, text: str, tmp_path: Path

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import crossed
 
 import qpsafe
 from qpsafe.danger.thresholds import robot_activation
@@ -20,7 +21,7 @@ LAWS = {
     "weighted": qpsafe.WeightedLaw,
 }
 each_robot = pytest.mark.parametrize("name", ROBOTS)
-each_law = pytest.mark.parametrize("law", LAWS)
+each_pair = pytest.mark.parametrize(("name", "law"), crossed(ROBOTS, LAWS))
 
 
 def controller(robot: Any, law: str, goal_q: np.ndarray, **options: Any) -> Any:
@@ -56,8 +57,7 @@ def run(robot: Any, control: Any, q: np.ndarray, ticks: int, points: Any = None)
     return q, seen
 
 
-@each_robot
-@each_law
+@each_pair
 def test_singular_poses_never_raise_and_never_pass_a_limit(name: str, law: str) -> None:
     robot = ROBOTS[name]
     for start in singular_poses(robot):
@@ -73,8 +73,7 @@ def test_the_zero_pose_is_singular_indeed() -> None:
         assert min(worst) < 0.02, robot.name
 
 
-@each_robot
-@each_law
+@each_pair
 def test_a_start_outside_a_limit_comes_back_at_bounded_speed(name: str, law: str) -> None:
     robot = ROBOTS[name]
     for joint in range(0, robot.nq, 3):

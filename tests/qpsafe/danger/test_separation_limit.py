@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from amounts import crossed, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
@@ -107,13 +108,12 @@ def reachable(level, box):
     return found.x[-1]
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("name", "law"), crossed(ROBOTS, LAWS))
 def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(name, law):
     """Random states in motion, random points and figures, every law; where not all can be obeyed, no more is broken."""
     robot, rng = ROBOTS[name], np.random.default_rng(sum(map(ord, name + law)))
     tool, obeyed, binding, impossible = robot.tool_frames[0], 0, 0, 0
-    for _ in range(20):
+    for _ in range(some(12, of=20)):
         figures = Separation(rng.uniform(0.5, 6.0), reaction_time=rng.uniform(0.0, 0.1))
         controller = controller_with(robot, LAWS[law], figures, gate="off", clearance="off")
         q, qd = some_state(robot, rng, share=0.1)
@@ -143,7 +143,7 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
                 broken = [float((np.maximum(level.A @ v - level.upper, 0.0) ** 2).sum()) for v in
                           (tick.reference.qd, again)]  # fmt: skip
                 assert broken[0] <= broken[1] + 1e-9
-    assert obeyed > 10
+    assert obeyed > some(5, of=10)
     assert binding > 2
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from amounts import first, some
 from numpy.typing import NDArray
 
 import qpsafe
@@ -57,7 +58,7 @@ def test_what_is_held_is_what_another_reckoning_holds(name: str, escape: float) 
     robot, rng, held, free = qpsafe.load_robot(name), np.random.default_rng(int(100 * escape)), 0, 0
     rules = VerifiedMotion(escape=escape)
     gate = Gate(robot, rules, JointLimits.of(robot, DT))
-    for _ in range(150):
+    for _ in range(some(40, of=150)):
         q, qd = drawn(robot, rng)
         points = beside(robot, q, rng, int(rng.integers(1, 6)))
         leads = rng.uniform(0.0, 0.1, len(points))
@@ -98,7 +99,7 @@ def test_who_moves_as_reckoned_finds_the_link_at_rest(name: str) -> None:
     limits, parts = JointLimits.of(robot, DT), Stages(robot, DT).link_parts
     rules = VerifiedMotion(escape=1e3, latency=0.0)  # no link gets away: all have to stand
     gate, a = Gate(robot, rules, limits), limits.max_acceleration
-    for _ in range(25):
+    for _ in range(some(8, of=25)):
         q, qd = drawn(robot, rng)
         p = beside(robot, q, rng, 1) + rng.normal(0.0, 0.5, (1, 3))
         target = int(rng.integers(len(parts.radii)))
@@ -122,7 +123,7 @@ def test_who_moves_as_reckoned_finds_the_link_at_rest(name: str) -> None:
             if tick >= 100:
                 way = parts.motion(robot.at(q))[0][target].mean(axis=0) - p[0]
                 p = p + rules.person_speed * DT * way / max(float(np.linalg.norm(way)), 1e-9)
-    assert touched >= 10
+    assert touched >= some(3, of=10)
 
 
 def test_a_hand_at_the_turntable_finds_it_at_rest_and_the_tick_says_so() -> None:
@@ -150,7 +151,7 @@ def test_a_hand_at_the_turntable_finds_it_at_rest_and_the_tick_says_so() -> None
     assert any(words.startswith("joint_1") for words in said[0.2])
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", first(2, range(4)))
 def test_a_batch_holds_the_same_joints_bit_by_bit(seed: int) -> None:
     robot, rng, held = qpsafe.load_robot("irb140"), np.random.default_rng(seed), 0
 

@@ -7,6 +7,7 @@ import struct
 import time
 from pathlib import Path
 
+import amounts
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -52,7 +53,7 @@ def some(count: int = 5, n: int = 6) -> list[JointReference]:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-@settings(max_examples=60)
+@settings(max_examples=amounts.some(20, of=60))
 @given(log=LOGS)
 def test_what_is_written_is_read_back_equal(log: list[JointReference], ending: str, tmp_path_factory) -> None:
     path = tmp_path_factory.mktemp("log") / f"log{ending}"

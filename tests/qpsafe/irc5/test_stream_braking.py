@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -133,7 +134,7 @@ def raising(number: int) -> Callable[[], None]:
 
 
 @given(st.lists(st.tuples(st.sampled_from(LEAVE), st.integers(0, 110)), min_size=1, max_size=8), st.integers(130, 300))
-@settings(max_examples=15)
+@settings(max_examples=some(6, of=15))
 def test_signals_in_any_order_and_repeated_brake_first(signals: list[tuple[int, int]], start: int) -> None:
     deeds: dict[int, list] = {}
     for number, later in signals:

@@ -305,7 +305,7 @@ def test_the_stream_ends_when_the_simulated_robot_has_and_says_which_events_happ
             "--port",
             str(stream.addresses["the robot"][1]),
         ]
-        command += ["--sensor-port", "0", "--event-port", "0", "--duration", "4", "--json"]
+        command += ["--sensor-port", "0", "--event-port", "0", "--duration", "4", "--lock-step", "--json"]
         subprocess.run(command, capture_output=True, timeout=200, check=True)
         assert stream.process.wait(timeout=60.0) in (0, 1)  # by itself
     assert stream.report["at_rest"] is True

