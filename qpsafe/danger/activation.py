@@ -184,11 +184,13 @@ class Activation(Fixed):
             return self._calm
         if cdf_n >= self._most:  # beyond the highest one
             return self._released
-        if self._plain:
-            switches = [switch(cdf_n, *numbers) for numbers in self._numbers]
-        else:
-            switches = [1.0 if cdf_n <= level.start else level(cdf_n) for level in self.levels]
-        kept = sum([cdf_n <= numbers[0] for numbers in self._numbers])
+        switches, kept = [], 0
+        for level, numbers in zip(self.levels, self._numbers, strict=True):
+            if cdf_n <= numbers[0]:
+                switches.append(1.0)
+                kept += 1
+            else:
+                switches.append(switch(cdf_n, *numbers) if self._plain else level(cdf_n))
         activations = multiply(switches, self.counts, [1.0] * len(self.thresholds))
         return Switching(tuple(switches), tuple(activations), self._names[kept])
 

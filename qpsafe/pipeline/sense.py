@@ -102,7 +102,7 @@ class Sense:
         self._ours = type(field) is DangerField, type(evasion) is Evasion
         tables = {} if sensing is None else sensing.tables._asdict()
         starts, stops = robot.wire_indices
-        ours = all(self._ours)
+        self._all_ours = ours = all(self._ours)
         given = (
             tables | robot.tree._asdict() | {"plausible": np.array(plausible(robot)), "starts": starts, "stops": stops}
         )
@@ -172,7 +172,8 @@ class Sense:
         seen = Seen(
             points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, severity != CLEAR
         )
-        seen = self._with(seen, more, readings=True)
+        if self._ranging is not None:
+            seen = self._with(seen, more, readings=True)
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
@@ -191,7 +192,9 @@ class Sense:
             refuse(q, qd, self._robot)
         if count < 0:
             refuse_points(points)
-        seen = self._with(Seen(points, links, danger, vectors, cdf_n, qd0, notes), more)
+        seen = Seen(points, links, danger, vectors, cdf_n, qd0, notes)
+        if self._ranging is not None:
+            seen = self._with(seen, more)
         return self._ended(seen, work, p if len(more.points) else 0)
 
     def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
@@ -209,8 +212,7 @@ class Sense:
         Raises:
             BadInput: With the spots, if their readings are given, too many sensors do not see.
         """
-        if self._ranging is None:
-            return seen
+        assert self._ranging is not None
         spots = self.parts[0].unseen if readings and self.parts[0] is not None else ()
         out = len(spots) + len(self._ranging.unseen) if spots else 0  # either kind alone has been counted
         if out > self._ranging.most:
@@ -227,7 +229,7 @@ class Sense:
     def _ended(self, seen: Seen, work: Array, moving: int) -> Seen:
         """What is left to do: the stages of another making, and to remember q̇0."""
         _, field, evasion, _ = self.parts
-        if not all(self._ours):
+        if not self._all_ours:
             seen = self._asked(seen, field, evasion, work, moving)
         elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
             raise BadInput(_NOT_FINITE)

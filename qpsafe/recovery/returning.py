@@ -105,7 +105,9 @@ class Returns:
     @property
     def clocks(self) -> tuple[tuple[bool, ...], bytes, bytes] | None:
         """Which tasks have to come back, and where they are on their way; to be set back. None where all are over."""
-        return None if self.over else (tuple(self.pending), self._marks.tobytes(), self._returns.tobytes())
+        if True not in self.pending:
+            return None
+        return tuple(self.pending), self._marks.tobytes(), self._returns.tobytes()
 
     @clocks.setter
     def clocks(self, clocks: tuple[tuple[bool, ...], bytes, bytes] | None) -> None:
