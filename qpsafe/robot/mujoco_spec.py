@@ -7,6 +7,7 @@ construction.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,6 +73,31 @@ def mujoco_spec(robot: Robot) -> tuple[Any, list[str]]:
     return spec, said
 
 
+@lru_cache(maxsize=8)
+def weighed_model(robot: Robot) -> Any:
+    """pinocchio's model with a mass and an inertia for all that moves: what the file leaves out is as simulated.
+
+    Without them a mass matrix is singular. A robot whose file states all of them has its own model, the very same.
+    """
+    lacking = [i for i in range(1, robot.nq + 1) if not _stated(robot.model.inertias[i])]
+    if not lacking:
+        return robot.model
+    import pinocchio as pin
+
+    compiled, found = mujoco_model(robot), robot.model.copy()
+    for i in lacking:
+        body = compiled.joint(robot.joint_names[i - 1]).bodyid[0]
+        turned = pin.Quaternion(*compiled.body_iquat[body].tolist()).matrix()
+        inertia = turned @ np.diag(compiled.body_inertia[body]) @ turned.T
+        found.inertias[i] = pin.Inertia(float(compiled.body_mass[body]), compiled.body_ipos[body].copy(), inertia)
+    return found
+
+
+def _stated(inertia: Any) -> bool:
+    """Whether a file states a mass and an inertia that a body can have."""
+    return bool(inertia.mass > LIGHT and np.linalg.eigvalsh(inertia.inertia)[-1] > 0.0)
+
+
 def _add_hulls(spec: Any, robot: Robot, bodies: list[Any]) -> set[int]:
     import mujoco
 
@@ -108,7 +134,7 @@ def _add_inertia(robot: Robot, bodies: list[Any], inertias: list[Any], shaped: s
     made_up = []
     for i, name in enumerate(robot.joint_names, 1):
         body, found = bodies[i], inertias[i]
-        if not (found.mass > LIGHT and np.linalg.eigvalsh(found.inertia)[-1] > 0.0):
+        if not _stated(found):
             made_up.append(name)
             if i not in shaped:
                 body.add_geom(

@@ -24,6 +24,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.robot.mujoco_spec import weighed_model
+
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
@@ -101,7 +103,7 @@ def effective_mass(robot: Robot, q: Array, jacobian: Array, normal: Array, paylo
     """m_R = 1 / (nᵀ J M(q)⁻¹ Jᵀ n) of the robot at a point, plus what it carries [kg].
 
     Args:
-        robot: With the inertias of its file.
+        robot: With the inertias of its file; of what it states none for, those that the simulation has.
         q: (n,) [rad].
         jacobian: Linear Jacobian of the point (3, n).
         normal: Unit vector (3,).
@@ -112,7 +114,8 @@ def effective_mass(robot: Robot, q: Array, jacobian: Array, normal: Array, paylo
     """
     import pinocchio as pin
 
-    M = pin.crba(robot.model, pin.Data(robot.model), q)
+    model = weighed_model(robot)
+    M = pin.crba(model, pin.Data(model), q)
     M = np.triu(M) + np.triu(M, 1).T  # crba fills the upper half
     row = normal @ jacobian
     mobility = float(row @ np.linalg.solve(M, row))
