@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,6 +85,19 @@ def load_robot(
     if robot.notes:
         warnings.warn(f"{robot.model_path.name}: " + "; ".join(robot.notes), RobotWarning, stacklevel=2)
     return robot.with_parameters(parameters)
+
+
+def load_quietly(name_or_path: str | Path, toml: str | Path | None = None, **given: Any) -> Robot:
+    """`load_robot` for whoever shows `robot.notes`, or for whom somebody has: nothing is warned of.
+
+    Args:
+        name_or_path: As for `load_robot`.
+        toml: As for `load_robot`.
+        given: As for `load_robot`.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return load_robot(name_or_path, toml, **given)
 
 
 def _bundled_folder() -> Path:

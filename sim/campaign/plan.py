@@ -24,7 +24,7 @@ import qpsafe.robots
 import qpsafe.sim
 import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.loader import find_robot
+from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
 from qpsafe.sim.campaign.servo import DT
 from qpsafe.sim.ranging.sets import sensor_kinds
 from qpsafe.text.json_text import json_text
@@ -116,18 +116,17 @@ class Plan:
         """What decides a trial's rows: the plan but for its length, contents of its files, and the code's digest."""
         named = self.to_dict()
         del named["trials"]
-        files = [
-            path
-            for path in (self.robot, *self.motions, self.people or "", self.cell or "")
-            if path and Path(path).exists()
-        ]
+        files = [path for path in (*self.motions, self.people or "", self.cell or "") if path and Path(path).exists()]
         for name in self.controllers:
             place = name.removesuffix(PERFECT).rpartition(":")[0]
             if place:  # a user's own
                 found = None if place.endswith(".py") else find_spec(place)
                 files.append(place if found is None else str(found.origin))
         named |= {"with": {name: version(name) for name in ("numpy", "numba", "pin", "mujoco")}}
-        return named | {"files": {path: _digest(_inside(Path(path))) for path in files}, "code": code_digest()}
+        found = {path: _digest(_inside(Path(path))) for path in files}
+        if self.robot not in bundled_robots():  # whose files are part of the code
+            found[self.robot] = _robot_digest(self.robot)
+        return named | {"files": found, "code": code_digest()}
 
     def digest(self) -> str:
         """64 hexadecimal digits that stand for `identity`."""
@@ -218,6 +217,20 @@ def code_digest() -> str:
     files = [(path.relative_to(folder), path) for folder in folders for path in _inside(folder)]
     deciding = [path for name, path in sorted(files) if path.suffix in _CODE and not _OUTPUT & set(name.parts)]
     return _digest(deciding)
+
+
+def _robot_digest(name: str) -> str:
+    """64 hexadecimal digits that stand for a robot: its own files, and its shapes, whatever files of meshes say them.
+
+    Nothing else that lies in its folder counts, the trials themselves among it.
+    """
+    robot = load_quietly(name)
+    own = {find_robot(name), robot.model_path, *robot.folder.glob("spots*.toml")}
+    own |= set() if robot.spots_path is None else {robot.spots_path}
+    found = hashlib.sha256(_digest(sorted(own)).encode())
+    for body, shape, vertices in robot.hulls():
+        found.update(f"{body} {shape}".encode() + vertices.tobytes())
+    return found.hexdigest()
 
 
 #: Endings of what decides, and folders of what only shows.

@@ -15,7 +15,7 @@ from qpsafe.controller import SafetyController
 from qpsafe.danger.separation import Separation
 from qpsafe.danger.thresholds import robot_activation
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.loader import load_robot
+from qpsafe.robot.loader import load_quietly
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.spots import SpotArray, load_spots
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
@@ -279,7 +279,7 @@ def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", ce
     """
     if motion not in MOTIONS and not Path(motion).is_file():
         raise ConfigurationError("campaign", "motions", motion, f"one of {', '.join(MOTIONS)}, or a program's file")
-    found = Station(motion, load_robot(robot), lag, sensor, cell)
+    found = Station(motion, load_quietly(robot), lag, sensor, cell)
     if found.robot.spots_path is None:
         raise ConfigurationError("campaign", "robot", robot, "a robot with distance sensors (spots.toml)")
     found.start  # noqa: B018  a program that the robot cannot follow is refused now

@@ -17,7 +17,7 @@ from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.peak import peak_field
 from qpsafe.placement.sample import NEAR, Detections
 from qpsafe.placement.sight import zone_rays
-from qpsafe.robot.loader import load_robot
+from qpsafe.robot.loader import load_quietly
 from qpsafe.sensing.spots import SpotArray, rays_in_world
 from qpsafe.sim.placement.draw import draw_pairs
 from qpsafe.sim.placement.dummy import RADII
@@ -71,7 +71,7 @@ class _Caster:
     """The world and the rays of a set-up, for one thread: a ray for each free zone, node after node."""
 
     def __init__(self, setup: Setup) -> None:
-        robot = load_robot(setup.robot)
+        robot = load_quietly(setup.robot)
         self.world = PlacementWorld(robot, setup.pedestal)
         self.node, zone = np.nonzero(setup.free)
         spots = setup.nodes.subset(self.node.tolist())

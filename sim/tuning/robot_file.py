@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-import shutil
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.loader import load_robot
+from qpsafe.robot.loader import load_quietly
 from qpsafe.robot.schema import Units
+from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.tuning.values import Values, present
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _HEADER = re.compile(r"""\s*\[\[?\s*[\w."' -]+\s*\]?\]\s*(#.*)?$""")
 
 
 def write_folder(robot: Robot, values: Values, run: str, folder: Path) -> Path:
-    """A copy of a robot's folder in which `robot.toml` states the values.
+    """A copy of a robot's folder in which `robot.toml` states the values; its model stays where it is.
 
     Args:
         robot: Whose folder.
@@ -37,9 +37,7 @@ def write_folder(robot: Robot, values: Values, run: str, folder: Path) -> Path:
     Raises:
         ConfigurationError: The file is written in a way that cannot be edited.
     """
-    if folder.exists():
-        shutil.rmtree(folder)
-    shutil.copytree(robot.folder, folder)
+    copied_folder(robot, folder)
     write_values(folder / "robot.toml", robot, values, run)
     return folder
 
@@ -63,7 +61,7 @@ def write_values(file: Path, robot: Robot, values: Values, run: str) -> None:
         raise ConfigurationError(file, "danger", "written in another way", expected)
     file.write_text(text, encoding="utf-8")
     try:
-        off = farthest(present(load_robot(file.parent)), values)
+        off = farthest(present(load_quietly(file.parent)), values)
     except BaseException:
         file.write_text(before, encoding="utf-8")
         raise

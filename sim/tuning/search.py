@@ -13,7 +13,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.loader import load_robot
+from qpsafe.robot.loader import load_quietly
 from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import crew_at_work
 from qpsafe.sim.tuning.ask import BATCH, CANDIDATES, SPREAD, ask
@@ -59,7 +59,7 @@ class Search:
 
     def space(self) -> Space:
         """Around the robot's present values."""
-        return Space.of(load_robot(self.plan.robot))
+        return Space.of(load_quietly(self.plan.robot))
 
     def identity(self) -> dict[str, Any]:
         """What decides every trial."""

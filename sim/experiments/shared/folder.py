@@ -1,0 +1,96 @@
+"""A robot's folder in another place: its own files are copied, its model stays where the meshes are that it names."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.robot.loader import bundled_robots, find_robot
+from qpsafe.text.json_text import json_text
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
+
+#: Of distance sensors in a robot's folder, of whatever kind.
+SENSORS = "spots*.toml"
+
+
+def copied_folder(robot: Robot, folder: Path, spots: str | None = None) -> Path:
+    """Write the files that describe a robot once more: `robot.toml`, the files of its sensors, its regions' meshes.
+
+    The folder of a robot of one's own may be where the model lies, as `qpsafe robots add` has it by default: in a
+    package of meshes, in a home folder, around the very place where the copy goes. So nothing else is copied, and the
+    model is named by its whole path: `../meshes` and `package://` in it stay right. The folder of a bundled robot has
+    nothing else, and is copied as it is.
+
+    Args:
+        robot: Loaded from a folder.
+        folder: The copy's; what was there is replaced.
+        spots: Text of a file of distance sensors for a robot that has none.
+
+    Returns:
+        The folder.
+
+    Raises:
+        ConfigurationError: Its `robot.toml` names its model in a way that cannot be edited.
+    """
+    if robot.folder.resolve() in [path.parent.resolve() for path in map(find_robot, bundled_robots())]:
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(robot.folder, folder, ignore=shutil.ignore_patterns("__pycache__"))
+        return folder
+    text = (robot.folder / "robot.toml").read_text(encoding="utf-8-sig")
+    sensors = {path.name: path for path in robot.folder.glob(SENSORS)}
+    stated = {"model": str(robot.model_path.resolve())}
+    if robot.spots_path is not None:
+        sensors[robot.spots_path.name] = robot.spots_path
+    if robot.spots_path is not None or spots is not None:
+        stated["spots"] = "spots.toml" if robot.spots_path is None else robot.spots_path.name
+    changed = with_keys(text, stated)
+    if changed is None:
+        expected = "a line of its own for model, and for spots"
+        raise ConfigurationError(robot.folder / "robot.toml", "model", "written in another way", expected)
+    for region in tomllib.loads(text).get("regions", ()):
+        mesh = Path(region.get("mesh", "/"))
+        if not mesh.is_absolute() and ".." not in mesh.parts and (robot.folder / mesh).is_file():
+            sensors[str(mesh)] = robot.folder / mesh
+    kept = {name: path.read_bytes() for name, path in sensors.items()}  # they may lie in the folder that is replaced
+    if spots is not None:
+        kept["spots.toml"] = spots.encode()
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    for name, content in kept.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    (folder / "robot.toml").write_text(changed, encoding="utf-8")
+    return folder
+
+
+def with_keys(text: str, stated: dict[str, str]) -> str | None:
+    """The text of a TOML file in which some keys above all tables have other words; all else as it was.
+
+    Args:
+        text: As it was.
+        stated: Key -> word.
+
+    Returns:
+        None where that could not be done by lines.
+    """
+    lines = text.splitlines()
+    for key, value in stated.items():
+        top = next((k for k, line in enumerate(lines) if line.lstrip().startswith("[")), len(lines))
+        line = f"{key} = {json_text(value, indent=None)}"
+        at = next((k for k in range(top) if re.match(rf"\s*{key}\s*=", lines[k])), None)
+        if at is None:
+            lines.insert(next((k + 1 for k in range(top) if re.match(r"\s*model\s*=", lines[k])), 0), line)
+        else:
+            lines[at] = line
+    found = "\n".join(lines) + "\n"
+    try:
+        return found if tomllib.loads(found) == tomllib.loads(text) | stated else None
+    except tomllib.TOMLDecodeError:
+        return None
