@@ -80,13 +80,9 @@ def load_named(name: str, screen: Console) -> Robot:
         name: What was typed.
         screen: Where it is said.
     """
-    import warnings
+    from qpsafe.robot.loader import load_quietly
 
-    from qpsafe.robot.loader import load_robot
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        robot = load_robot(name)
+    robot = load_quietly(name)
     say(screen, f"{robot.name}:", robot.notes)
     return robot
 
@@ -188,7 +184,7 @@ def show_checks(title: str, checks: Sequence[Check], screen: Console, left_out: 
     if not all(check.counts for check in checks):
         screen.print("no promise: it depends on distances that were chosen for another robot", style="dim")
     if left_out:
-        screen.print("left out, since nothing of the kind happened in so short a run:", style="yellow")
+        screen.print("left out, since nothing of the kind happened, or no sensor saw it:", style="yellow")
         for name in left_out:
             screen.print(f"  {name}")
 

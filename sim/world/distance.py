@@ -6,6 +6,7 @@ are called so by all three.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -42,12 +43,16 @@ class TrueDistances:
 
     Args:
         scene: The scene.
+        moving: Whether only links that move are measured, without the foot that is bolted down.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, moving: bool = False) -> None:
         from qpsafe.sim.engine.distances import Distances  # compiled when there is something to be measured
 
-        self._scene, self._distances = scene, Distances(World.of(scene), scene.robot)
+        world = World.of(scene)
+        if moving:
+            world = replace(world, robot=world.robot[world.index[world.robot, BODY] != 0])
+        self._scene, self._distances = scene, Distances(world, scene.robot)
 
     def measure(self, data: Any) -> tuple[Distance, Distance]:
         """To the nearest board and to the nearest body, boards not counted; geom poses are up to date.

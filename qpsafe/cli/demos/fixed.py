@@ -167,7 +167,8 @@ def _write(experiment: FixedExperiment, log: RunLog, title: str, out: Path) -> R
 
     without = experiment.board_distance_without_controller()
     tuned = robot_stage(experiment.robot).listed
-    report = summarise(log, without, experiment.walk.windows, experiment.robot, tuned=tuned)
+    within, kept = experiment.moving_links(log)
+    report = summarise(log, kept, experiment.walk.windows, experiment.robot, tuned=tuned, within=within)
     log.write_csv(out / "signals.csv")
     activation = robot_activation(experiment.robot)
     figure_11(log, out / "figure.png", f"First experiment, {experiment.robot.name}, {title}", activation)
@@ -211,7 +212,7 @@ def show(report: Report, title: str, screen: Console) -> None:
 
     if report.approaches:
         headings = ("approach [s]", "with controller [m]", "without [m]", "gained [m]")
-        sheet = Sheet("Smallest true distance between robot and board", headings, text=())
+        sheet = Sheet("Smallest true distance between links that move and board", headings, text=())
         for approach in report.approaches:
             gained = approach.with_controller - approach.without_controller
             numbers = (approach.with_controller, approach.without_controller, gained)

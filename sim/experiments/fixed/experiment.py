@@ -49,11 +49,27 @@ class FixedExperiment(FixedSettings):
 
     def board_distance_without_controller(self) -> NDArray[np.float64]:
         """Smallest distance robot-board at every tick if the robot just keeps its pose (N,) [m]."""
-        scene, walk, dt = self.scene, self.walk, 0.004
-        data, poses, gaps = scene.make_data(), PosesAhead(walk.people, dt), TrueDistances(scene)
-        result = np.empty(round(self.duration / dt))
+        return self._board_distance(TrueDistances(self.scene))
+
+    def moving_links(self, log: RunLog) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The same of the links that move, in a run and if the robot just keeps its pose, (N,) each [m].
+
+        A foot that is bolted down may be what is nearest to somebody, and gets away from nobody.
+
+        Args:
+            log: The run.
+        """
+        gaps = TrueDistances(self.scene, moving=True)
+        return self._board_distance(gaps, log.q), self._board_distance(gaps)
+
+    def _board_distance(self, gaps: TrueDistances, q: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        scene, dt = self.scene, 0.004
+        data, poses = scene.make_data(), PosesAhead(self.walk.people, dt)
+        result = np.empty(round(self.duration / dt) if q is None else len(q))
         for k in range(len(result)):
             scene.place_people(data, poses(k))
+            if q is not None:
+                data.qpos[scene.q_addresses] = q[k]
             result[k] = gaps.board(data).distance
         return result
 

@@ -34,7 +34,7 @@ class RegimeRow(NamedTuple):
 
 
 class ApproachRow(NamedTuple):
-    """One approach: its time [s], the smallest true distance to the board with and without the controller [m]."""
+    """One approach: its time [s], the smallest true distance links-board with and without the controller [m]."""
 
     start: float
     end: float
@@ -104,7 +104,13 @@ class Report:
 
 
 def summarise(
-    log: RunLog, without: NDArray[np.float64], windows: tuple[Window, ...], robot: Robot, *, tuned: bool = True
+    log: RunLog,
+    without: Array,
+    windows: tuple[Window, ...],
+    robot: Robot,
+    *,
+    tuned: bool = True,
+    within: Array | None = None,
 ) -> Report:
     """Make the report of a run.
 
@@ -115,7 +121,9 @@ def summarise(
         robot: For its limits.
         tuned: Whether people's pauses were chosen for this robot, so that every approach shows all of Table I. If not,
             what depends on them is shown and does not count.
+        within: Distance robot-board at every tick of the run, measured as `without`; by default the log's (N,) [m].
     """
+    within = log.board_distance if within is None else within
     shown: list[Check | str] = [*_order(log, windows), *_released(log, windows)]
     if not tuned:
         shown = [c if isinstance(c, str) else c._replace(counts=False, name=f"{c.name} (no promise)") for c in shown]
@@ -131,9 +139,7 @@ def summarise(
         ):  # nobody came near enough for sensors at a rule's places
             found.append(f"distance to the board, approach at {start:.1f} s")
             continue
-        approaches.append(
-            ApproachRow(start, end, float(log.board_distance[inside].min()), float(without[inside].min()))
-        )
+        approaches.append(ApproachRow(start, end, float(within[inside].min()), float(without[inside].min())))
     found.extend(
         Check(
             f"distance to the board, approach at {row.start:.1f} s",
