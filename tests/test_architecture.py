@@ -34,12 +34,13 @@ plugins placement irc5 irc5.records bench check
 sim.people sim.world sim.engine sim.ranging
 sim.stories sim.recording
 sim.drawing
+sim.placement
 sim.experiments.shared
 sim.experiments.fixed
 sim.experiments.path
 sim.experiments.pick_place
 sim.replay
-sim.experiments sim.sick sim.placement
+sim.experiments sim.sick
 sim.campaign.people
 sim.campaign
 sim.campaign.report

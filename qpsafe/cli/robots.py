@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -124,10 +123,12 @@ def add(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing robot.toml.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Write JSON to standard output.")] = False,
 ) -> None:
-    """Write a first robot.toml for a model file: limits, wire and frames as found, with notes on what was assumed."""
+    """Write a first robot folder for a model file: limits, wire and frames as found, a home posture and sensors chosen.
+
+    What was assumed and chosen is noted in it. Sensors that are there already, as spots.toml, are kept.
+    """
     from qpsafe.errors import ConfigurationError
-    from qpsafe.robot.loader import find_robot, load_robot
-    from qpsafe.robot.starting_file import starting_robot_toml
+    from qpsafe.robot.loader import find_robot, load_quietly
 
     if find_robot(file).suffix == ".toml":
         raise ConfigurationError("robots add", "FILE", file, "an MJCF or URDF file: this robot has its robot.toml")
@@ -138,29 +139,59 @@ def add(
         raise ConfigurationError("robots add", "robot.toml", str(path), "no such file yet; --force writes over it")
     try_folder("qpsafe robots add", "FILE" if out is None else "--out", folder)
     folder.mkdir(parents=True, exist_ok=True)
+    text, spots, said = _first_files(robot, folder)
     try:
-        part.write_text(starting_robot_toml(robot, folder), encoding="utf-8")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            again = load_robot(robot.model_path, part)  # what does not load is not written
+        part.write_text(text, encoding="utf-8")
+        again = load_quietly(robot.model_path, part)  # what does not load is not written
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+    if spots is not None:
+        (folder / "spots.toml").write_text(spots, encoding="utf-8")
     if json:
-        print_json({"file": str(path), "name": again.name, "joints": again.nq, "notes": robot.notes})
+        print_json({"file": str(path), "name": again.name, "joints": again.nq, "notes": said})
         return
     screen = console(json)
-    screen.print(f"written: {path}")
-    for note in robot.notes:
+    screen.print(f"written: {path}" + ("" if spots is None else ", spots.toml"), soft_wrap=True)
+    for note in said:
         screen.print(f"note: {note}", style="yellow")
     size = f"{counted(again.nq, 'joint')}, {counted(len(again.wire_frames), 'link')}"
-    screen.print(f"{again.name}: {size}, see `qpsafe robots {shlex.quote(str(folder))}`", soft_wrap=True)
+    named = shlex.quote(str(folder))
+    screen.print(f"{again.name}: {size}, see `qpsafe robots {named}`; it is the --robot {named}", soft_wrap=True)
+
+
+def _first_files(robot: Robot, folder: Path) -> tuple[str, str | None, list[str]]:
+    """Texts of a robot.toml and a spots.toml, None for no new one, and what was assumed and chosen.
+
+    What is no arm, or is added where nothing can be simulated, gets what its file says.
+
+    Args:
+        robot: Loaded from the model file alone.
+        folder: Where the files will stand.
+    """
+    from qpsafe.errors import ConfigurationError, MissingExtraError
+    from qpsafe.extras import require
+    from qpsafe.robot.starting_file import starting_robot_toml
+
+    there = "spots.toml" if (folder / "spots.toml").exists() else None
+    try:
+        require("sim", "the choice of a home posture and of sensors", "mujoco")
+        from qpsafe.sim.experiments.shared.ready import check_arm, choices
+
+        check_arm("robots add", robot, 1)
+    except MissingExtraError as missing:
+        said = [*robot.notes, str(missing)]
+    except ConfigurationError as odd:
+        said = [*robot.notes, f"no home posture and no sensors are chosen for {odd.value}: for {odd.expected} they are"]
+    else:
+        found = choices(robot, there is None)
+        new = None if there or not found.sensors else found.spots_toml
+        return found.robot_toml(folder, there if new is None else "spots.toml"), new, found.said
+    return starting_robot_toml(robot, folder, spots=there, assumed=said), None, said
 
 
 def _load(name: str) -> Robot:
     """The robot; its notes are printed, not warned of."""
-    from qpsafe.robot.loader import load_robot
+    from qpsafe.robot.loader import load_quietly
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return load_robot(name)
+    return load_quietly(name)

@@ -76,9 +76,9 @@ def tune(
         raise ConfigurationError(WHERE, "--seed", seed, f"a whole number from 0 to {MOST}")
     if finals > FINALS:
         raise ConfigurationError(WHERE, "--finals", finals, f"at most {FINALS:,}")
-    plan = _plan(robot, program, cell, people)
     if write:
-        _own(plan.robot)
+        _own(robot)
+    plan = _plan(robot, program, cell, people)
     search = Search(plan, seed)
     folder = Path("out") / f"tune-{search.plan.digest()[:8]}" if out is None else out
     with executor_at(dask) as executor, _kept(folder, screen):
@@ -99,18 +99,16 @@ def _plan(robot: str, program: Path | None, cell: Path | None, people: Path | No
         raise ConfigurationError(WHERE, "--program", str(program), "a program's TOML file that is there")
     motions = None if program is None else str(program)
     given = {"robot": robot, "motions": motions, "people": people, "cell": cell}
-    plan = make_plan(None, WHERE, **given)
-    from qpsafe.sim.campaign.station import station
-
-    for motion in plan.motions:
-        station(plan.robot, motion, cell=plan.cell)  # a program that cannot be followed is refused now
-    return plan
+    return make_plan(None, WHERE, **given)
 
 
 def _own(robot: str) -> None:
-    """Refuse to write into the package."""
-    from qpsafe.robot.loader import bundled_robots
+    """Refuse to write into the package, and into a folder that the next run of a bare model makes anew."""
+    from qpsafe.robot.loader import bundled_robots, find_robot
 
+    if find_robot(robot).suffix != ".toml":
+        expected = "--robot with the folder of a robot of your own: `qpsafe robots add` makes one of a model file"
+        raise ConfigurationError(WHERE, "--write", robot, expected)
     if robot in bundled_robots():
         expected = "--robot with the folder of a robot of your own: the bundled ones are part of the package"
         raise ConfigurationError(WHERE, "--write", robot, expected)
@@ -195,13 +193,13 @@ def _judged(found: Tuned, folder: Path, encounters: int, screen: Console, crew: 
         screen: Where to.
         crew: Who plays.
     """
-    from qpsafe.robot.loader import load_robot
+    from qpsafe.robot.loader import load_quietly
     from qpsafe.sim.tuning.judge import judge
     from qpsafe.sim.tuning.robot_file import write_folder
 
     plan = found.search.plan
     values = found.space.at(found.chosen.point)
-    copy = write_folder(load_robot(plan.robot), values, found.run, folder / "robot")
+    copy = write_folder(load_quietly(plan.robot), values, found.run, folder / "robot")
     if encounters == 0 or found.chosen.number == 0:
         return None
     with counting("encounters that judge", screen) as count:
@@ -265,12 +263,12 @@ def _show(said: dict[str, Any], screen: Console) -> None:
 
 def _written(found: Tuned, judged: Judged | None, screen: Console) -> None:
     """Into the robot's own file, if the judgement says that they are worth it."""
-    from qpsafe.robot.loader import find_robot, load_robot
+    from qpsafe.robot.loader import find_robot, load_quietly
     from qpsafe.sim.tuning.robot_file import write_values
 
     file = find_robot(found.search.plan.robot)
     if judged is None or not judged.worth:
         screen.print(f"{file} stays as it is: nothing surely better was found", style="yellow", soft_wrap=True)
         return
-    write_values(file, load_robot(file.parent), found.space.at(found.chosen.point), found.run)
+    write_values(file, load_quietly(file.parent), found.space.at(found.chosen.point), found.run)
     screen.print(f"written into {file}", soft_wrap=True)

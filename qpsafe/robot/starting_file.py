@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from qpsafe.robot.defaults import HOMELESS
 from qpsafe.robot.robot import Robot
 
 
@@ -17,24 +14,22 @@ def starting_robot_toml(
     robot: Robot,
     folder: Path,
     *,
-    home: NDArray[np.float64] | None = None,
-    max_acceleration: NDArray[np.float64] | None = None,
     spots: str | None = None,
+    assumed: Sequence[str] | None = None,
 ) -> str:
     """The text of a robot.toml that says what was found in a bare model file and what was assumed.
 
     Args:
         robot: Loaded from the model file alone.
         folder: Where the file will stand; the model is named relative to it where it is below.
-        home: Another home pose than the robot's (n,) [rad].
-        max_acceleration: Other acceleration limits than the robot's (n,) [rad/s²].
         spots: File of distance sensors beside it, if there is one.
+        assumed: What was assumed and chosen, in words; by default the robot's notes.
     """
     model = robot.model_path.resolve()
     name = os.path.relpath(model, folder.resolve()) if folder.resolve() in model.parents else str(model)
     lines = [
         f"# {robot.title}: written by `qpsafe robots add` from {robot.model_path.name}. Check every value, above all:",
-        *(f"# - {note}" for note in robot.notes if home is None or not note.startswith(HOMELESS)),
+        *(f"# - {note}" for note in (robot.notes if assumed is None else assumed)),
         "",
         f"name = {_text(robot.name)}",
         f"title = {_text(robot.title)}",
@@ -42,7 +37,7 @@ def starting_robot_toml(
         '# spots = "spots.toml"             # distance sensors, if it carries any'
         if spots is None
         else f"spots = {_text(spots)}",
-        f"home = [{', '.join(map(_figure, robot.home if home is None else home, robot.sliding))}]",
+        f"home = [{', '.join(map(_figure, robot.home, robot.sliding))}]",
         "",
         "[units]",
         'length = "m"',
@@ -52,8 +47,6 @@ def starting_robot_toml(
         "",
     ]
     limits = {key: getattr(robot, key) for key in ("lower", "upper", "max_velocity", "max_acceleration")}
-    if max_acceleration is not None:
-        limits["max_acceleration"] = max_acceleration
     for i, joint in enumerate(robot.joint_names):
         lines += [f"[joints.{_text(joint)}]"]
         for key in limits:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, progress_bar
-from qpsafe.cli.demos.any_robot import any_robot, own_folder
+from qpsafe.cli.campaign.ready import plan_for_its_robot
+from qpsafe.cli.common import progress_bar
 from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -81,7 +81,6 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
     Raises:
         ConfigurationError: Names the option, or the file with the line.
     """
-    from qpsafe.robot.loader import find_robot, load_robot
     from qpsafe.sim.campaign.plan import Plan, load_plan
 
     plan = Plan() if file is None else file if isinstance(file, Plan) else load_plan(file)
@@ -96,31 +95,20 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
         made = replace(plan, **typed)
     except ConfigurationError as wrong:
         raise ConfigurationError(where, f"--{wrong.key}", wrong.value, wrong.expected) from None
-    if find_robot(made.robot).suffix != ".toml":  # a bare model: a folder is made for it
-        ready = any_robot(where, made.robot, own_folder(made.robot), console(True))
-        made = replace(made, robot=str(ready.folder))
-    if load_robot(made.robot).spots_path is None:
-        expected = "a robot with distance sensors (spots.toml)"
-        raise ConfigurationError(where, "--robot", made.robot, expected)
     _read_files(made)
-    return made
+    named = "motions" in typed or made.motions != Plan.motions
+    return plan_for_its_robot(where, made, named)
 
 
 def _read_files(plan: Plan) -> None:
     """Read the files that a plan names: what is wrong in them is said before anything begins."""
     from qpsafe.sensing.cell_file import load_cell
     from qpsafe.sim.campaign.people import EncounterModel
-    from qpsafe.sim.campaign.plan import MOTIONS
 
     if plan.people is not None:
         EncounterModel.load(plan.people)
     if plan.cell is not None:
         load_cell(plan.cell)
-    for motion in plan.motions:
-        if motion not in MOTIONS:
-            from qpsafe.sim.campaign.station import station
-
-            station(plan.robot, motion, cell=plan.cell)
 
 
 @contextmanager

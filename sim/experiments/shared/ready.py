@@ -6,16 +6,17 @@ and used for the next run: the experiment runs on that folder, as it would on on
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.defaults import HOMELESS
-from qpsafe.robot.loader import bundled_robots, find_robot, load_robot
+from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
 from qpsafe.robot.starting_file import starting_robot_toml
+from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.experiments.shared.home import Arm, chosen_home
 from qpsafe.sim.experiments.shared.skin import skin_toml
 from qpsafe.sim.world.robot_spec import UNSTATED, torques
@@ -53,36 +54,77 @@ def made_ready(where: str, name: str, out: Path, joints: int = 4) -> Ready:
         ConfigurationError: The robot cannot do what the command shows; says why, before anything is written.
         RobotFileError: The robot's files are wrong.
     """
-    robot, folder = _quietly(name), out / "robot"
+    robot, folder = load_quietly(name), out / "robot"
     check_arm(where, robot, joints)
     if name in bundled_robots():
         return Ready(robot)
     said, bare = list(robot.notes), find_robot(name).suffix != ".toml"
     if bare:
-        home, stated = robot.home, not any(note.startswith(HOMELESS) for note in said)  # an MJCF may have a keyframe
-        if not stated:
-            home = chosen_home(robot)
-            said = [note for note in said if not note.startswith(HOMELESS)]
-            said.append(f"home posture chosen: {', '.join(f'{q:.2f}' for q in home)} rad")
-        share, words = bearable(robot)
-        said += words
+        found = choices(robot)
+        if not found.sensors:
+            raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
         folder.mkdir(parents=True, exist_ok=True)
-        gentle = share * robot.max_acceleration
-        text = starting_robot_toml(robot, folder, home=home, max_acceleration=gentle, spots="spots.toml")
-        (folder / "robot.toml").write_text(text, encoding="utf-8")
-        robot = _quietly(folder)
-    if bare or robot.spots_path is None:
+        (folder / "robot.toml").write_text(found.robot_toml(folder), encoding="utf-8")
+        (folder / "spots.toml").write_text(found.spots_toml, encoding="utf-8")
+        said = found.said
+    elif robot.spots_path is None:
         text, count = skin_toml(robot)
         if not count:
             raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "spots.toml").write_text(text, encoding="utf-8")
-        robot = _quietly(folder) if bare else robot.with_spots((folder / "spots.toml").resolve())
-        said += [
-            f"{count} distance sensors put on its links",
-            f"written to {folder}: correct it, and give it as --robot",
-        ]
-    return Ready(robot, tuple(said))
+        copied_folder(robot, folder, text)
+        said.append(f"{count} distance sensors put on its links")
+    else:
+        return Ready(robot, tuple(said))
+    said.append(f"written to {folder}: correct it, and give it as --robot")
+    return Ready(load_quietly(folder), tuple(said))
+
+
+class Choices(NamedTuple):
+    """What is chosen for a robot of which there is only a model file.
+
+    Attributes:
+        robot: With the home posture and the accelerations that were chosen.
+        spots_toml: Text of the file of its distance sensors.
+        sensors: How many these are.
+        said: What was assumed and chosen, in words.
+    """
+
+    robot: Robot
+    spots_toml: str
+    sensors: int
+    said: list[str]
+
+    def robot_toml(self, folder: Path, spots: str | None = "spots.toml") -> str:
+        """Text of its `robot.toml`.
+
+        Args:
+            folder: Where it will stand.
+            spots: File of its sensors beside it, None for none.
+        """
+        return starting_robot_toml(self.robot, folder, spots=spots, assumed=self.said)
+
+
+def choices(robot: Robot, sensors: bool = True) -> Choices:
+    """Choose a home posture, if the file states none, accelerations that its torques bear, and distance sensors.
+
+    Args:
+        robot: Loaded from the model file alone.
+        sensors: Whether it needs any.
+    """
+    said, home = list(robot.notes), robot.home
+    if any(note.startswith(HOMELESS) for note in said):  # an MJCF may have a keyframe
+        home = chosen_home(robot)
+        said = [note for note in said if not note.startswith(HOMELESS)]
+        said.append(f"home posture chosen: {', '.join(f'{q:.2f}' for q in home)} rad")
+    share, words = bearable(robot)
+    made = load_quietly(robot.model_path, home=home, max_acceleration=share * robot.max_acceleration)
+    text, count = "", 0
+    if sensors:
+        with TemporaryDirectory() as place:  # they are chosen by a simulation, which reads the robot's file
+            Path(place, "robot.toml").write_text(starting_robot_toml(made, Path(place)), encoding="utf-8")
+            text, count = skin_toml(load_quietly(place))
+    said += [*words, *([f"{count} distance sensors put on its links"] if sensors else [])]
+    return Choices(made, text, count, said)
 
 
 def bearable(robot: Robot) -> tuple[float, list[str]]:
@@ -97,13 +139,6 @@ def bearable(robot: Robot) -> tuple[float, list[str]]:
     if share == 1.0:
         return 1.0, []
     return share, [f"accelerations reduced to {100 * share:.0f} %: more the stated torques cannot bear everywhere"]
-
-
-def _quietly(name: str | Path) -> Robot:
-    """A robot whose notes are said by who asks for it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return load_robot(name)
 
 
 def check_arm(where: str, robot: Robot, joints: int) -> None:

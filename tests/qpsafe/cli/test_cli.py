@@ -231,7 +231,7 @@ def test_robots_add_writes_a_file_that_loads_and_never_over_another(tmp_path: Pa
     assert load_robot(tmp_path).name == "mine"
     assert run(app, ["robots", "add", str(model), "--force"]).exit_code == 0
     assert load_robot(tmp_path).name == "iiwa14"
-    assert sorted(item.name for item in tmp_path.iterdir()) == ["arm.xml", "robot.toml"]
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["arm.xml", "robot.toml", "spots.toml"]
 
 
 def test_robots_add_refuses_what_has_its_file(tmp_path: Path) -> None:
