@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +16,17 @@ if TYPE_CHECKING:
 
 
 def own_folder(name: str) -> Path:
-    """Where a folder is made for a robot by commands that write nothing else."""
-    return Path("out/robots") / re.sub(r"[^\w.-]+", "-", Path(name).stem)
+    """Where a folder is made for a robot by commands that write nothing else: one for each model, whatever its name.
+
+    Many call their file `model.urdf`, and what one command has made another may be playing.
+
+    Args:
+        name: What was typed.
+    """
+    path = Path(name).resolve() if Path(name).exists() else Path(name)
+    mark = hashlib.sha256(str(path).encode()).hexdigest()[:6]
+    word = re.sub(r"[^\w.-]+", "-", path.stem)
+    return Path("out/robots") / f"{word}-{mark}"
 
 
 def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6) -> Robot:

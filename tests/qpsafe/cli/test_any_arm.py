@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from qpsafe.cli.campaign.options import make_plan
+from qpsafe.cli.demos.any_robot import own_folder
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_quietly
@@ -97,6 +98,17 @@ def test_a_folder_without_sensors_gets_some_in_a_copy(tmp_path: Path) -> None:
     assert load_quietly(plan.robot).spots_path is not None
     assert (folder / "robot.toml").read_text() == before
     assert not (folder / "spots.toml").exists()
+
+
+def test_models_of_one_name_do_not_share_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["a/model.urdf", "b/model.urdf", "a/model.xml", "package:model"]
+    for name in names[:3]:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("")
+    assert len({own_folder(name) for name in names}) == len(names)
+    assert own_folder("a/model.urdf") == own_folder(str(tmp_path / "a" / "model.urdf"))
+    monkeypatch.chdir(tmp_path / "a")
+    assert own_folder(".").name.startswith("a-")
 
 
 def test_what_is_no_arm_is_added_as_its_file_says(tmp_path: Path) -> None:
