@@ -94,6 +94,7 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
         options |= {name: settings[name] for name in PLAIN}
         furniture = settings.get("cell", ())  # older runs had none
         options["cell"] = tuple(Obstacle(name, np.array(vertices)) for name, vertices in furniture)
+        options["parameters"] = settings.get("parameters", "paper")
         if settings["story"] is not None:
             options["story"] = _story_of(settings["story"])
         else:

@@ -66,6 +66,9 @@ def fixed(
         typer.Option(help="Other sensors: a file in the robot's folder, such as spots-by-hand.toml, or a path."),
     ] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of a story, instead of the paper's.")] = None,
+    parameters: Annotated[
+        str, typer.Option(help="paper: the paper's, whatever the robot's file states; robot: those of its file.")
+    ] = "paper",
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4; needs OpenGL.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -77,6 +80,8 @@ def fixed(
     screen = console(json)
     if spots is not None and robot == "all":
         raise ConfigurationError("qpsafe demo fixed", "spots", spots, "one robot, not 'all': sensors fit one robot")
+    if parameters not in ("paper", "robot"):
+        raise ConfigurationError("qpsafe demo fixed", "--parameters", parameters, "paper or robot")
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.experiments.encounter import encounter
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
@@ -104,10 +109,12 @@ def fixed(
             story=told,
             sensor=sensor,
             cap=cap,
+            parameters=parameters,
         )
 
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
     title += "" if sensor == "ideal" else f", sensors {sensor}"
+    title += "" if parameters == "paper" else ", the robot's own parameters"
     if robot == "all":
 
         def run(experiment: FixedExperiment, folder: Path) -> Report:

@@ -1,0 +1,44 @@
+"""The first experiment with the parameters of a robot's file, as after tuning: they are used, recorded and replayed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from qpsafe.cli.main import app
+from qpsafe.errors import ConfigurationError
+from qpsafe.robot.loader import load_robot
+from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+from qpsafe.sim.replay.settings import controller_of, experiment_of, settings_of
+from qpsafe.sim.tuning.robot_file import write_folder
+from qpsafe.sim.tuning.space import Space
+
+
+@pytest.mark.parametrize("name", ["irb140", "iiwa14"])
+@pytest.mark.parametrize("parameters", ["paper", "robot"])
+def test_parameters_are_those_that_were_asked_for(name: str, parameters: str, tmp_path: Path) -> None:
+    space = Space.of(load_robot(name))
+    values = space.at(space.near(np.random.default_rng(4), 0.3))
+    robot = load_robot(write_folder(load_robot(name), values, "a run", tmp_path / "copy"))
+    experiment = FixedExperiment(robot, duration=0.02, parameters=parameters)
+    controller = controller_of(experiment)
+    own = parameters == "robot"
+    assert (controller.activation.levels[0].delta == values.delta) == own
+    assert (controller.recovery_rules.calm == values.calm) == own
+    mass, damping = controller.evasion.mass, controller.evasion.damping
+    assert np.allclose(np.diag(mass), values.mass) == own
+    assert np.allclose(np.diag(damping), values.damping) == own
+    again = experiment_of(json.loads(json.dumps(settings_of(experiment))))
+    assert again.parameters == parameters
+    np.testing.assert_array_equal(again.run().q_ref, experiment.run().q_ref)
+
+
+def test_what_is_neither_is_refused(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["demo", "fixed", "--parameters", "mine", "--out", str(tmp_path / "out")])
+    assert isinstance(result.exception, ConfigurationError)
+    assert "paper or robot" in str(result.exception)
+    assert not (tmp_path / "out").exists()
