@@ -164,7 +164,7 @@ def tuned() -> str:
     """What came of each run of `qpsafe tune`, judged on encounters that nothing was tuned on."""
     heads = ("robot", "search", "tried, all encounters", "processor time [s]", "judged on", "harm", "work lost [s]")
     rows = [f"| {' | '.join((*heads, 'contacts', 'furniture, self'))} |", "|" + " --- |" * 9]
-    for run in measured("tune")["runs"]:
+    for run in measured("tune")["runs"] + measured("tune-foreign")["runs"]:
         judged, search = run["judgement"], run["search"]
         name, tried = f"`{run['robot']}`", f"{run['tried']}, {run['whole']} | {search['processor_s']:.0f}"
         if judged is None:

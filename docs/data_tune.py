@@ -1,7 +1,13 @@
 """Write docs/data/tune.json and its figures from folders of `qpsafe tune`: python docs/data_tune.py FOLDER ...
 
 Of each run what the page needs is kept: the front, the choice, its judgement and what matters; of the first one all
-trials, for the figure.
+trials, for the figure. docs/data/tune-foreign.json, of an arm that nothing was tuned on, is written by
+
+    python benchmarks/made_up_arm.py arm.urdf && qpsafe robots add arm.urdf --out arm
+    qpsafe tune --robot arm --trials 49 --finals 200 --judge 450 --out tuned
+    qpsafe demo fixed --no-video --parameters robot --robot arm --out before
+    qpsafe demo fixed --no-video --parameters robot --robot tuned/robot --out after
+    python docs/data_tune.py --foreign tuned before after
 """
 
 from __future__ import annotations
@@ -25,7 +31,35 @@ def short(said: dict[str, Any]) -> dict[str, Any]:
     return {key: said[key] for key in KEPT} | {"tried": len(said["trials"]), "whole": whole}
 
 
+def foreign(tuned: str, before: str, after: str) -> dict[str, Any]:
+    """What is kept of an arm that nothing was tuned on.
+
+    Args:
+        tuned: Folder of its tuning.
+        before: Of its first experiment with the values that it had.
+        after: Of the same with the tuned ones.
+    """
+    reports = {
+        name: json.loads((Path(folder) / "report.json").read_text(encoding="utf-8"))
+        for name, folder in (("before", before), ("after", after))
+    }
+    fixed = {
+        name: {
+            "kept": said["kept"],
+            "missed": [check for check in said["checks"] if check["counts"] and not check["kept"]],
+            "approaches": said["approaches"],
+            "left_out": said["left_out"],
+        }
+        for name, said in reports.items()
+    }
+    return {"runs": [short(json.loads((Path(tuned) / "tune.json").read_text(encoding="utf-8")))], "fixed": fixed}
+
+
 if __name__ == "__main__":
+    if sys.argv[1] == "--foreign":
+        text = json_text(foreign(*sys.argv[2:]), indent=1)
+        (DATA / "tune-foreign.json").write_text(text + "\n", encoding="utf-8")
+        raise SystemExit
     results = [json.loads((Path(folder) / "tune.json").read_text(encoding="utf-8")) for folder in sys.argv[1:]]
     runs = [short(said) for said in results]
     runs[0]["trials"] = results[0]["trials"]

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,6 +142,30 @@ def tune() -> list[str]:
         f"{means['harm']['value']:+.4f} and {means['lost']['value']:+.2f} s in the judgement",
         f"seemed to cost {searched[number]:+.4f}",
         f"All {len(others)} finalists did more harm",
+        *tune_foreign(run["judgement"]),
+    ]
+
+
+def tune_foreign(bundled: dict[str, Any]) -> list[str]:
+    found = measured("tune-foreign")
+    (run,), fixed = found["runs"], found["fixed"]
+    judged = run["judgement"]
+    assert run["sentence"].startswith("The present values were already as good")
+    assert not judged["new_faults"]
+    assert judged["shares"]["contacts"]["tuned"] <= judged["shares"]["contacts"]["present"]
+    gains = {}
+    for name, said in fixed.items():
+        assert said["kept"]
+        assert "distance to the board, approach at 3.5 s" in said["left_out"]
+        ways = [1e3 * (one["with_controller"] - one["without_controller"]) for one in said["approaches"]]
+        gains[name] = " and ".join(f"{way:.0f}" for way in ways)
+    shares = [(one["shares"]["contacts"]["present"], one["encounters"]) for one in (judged, bundled)]
+    (mine, of), (theirs, all_of) = shares
+    assert mine / of < theirs / all_of
+    return [
+        f"touched in {mine} of {of} encounters, {100 * mine / of:.1f} %",
+        f"what it ships in {theirs} of {all_of:,}, {100 * theirs / all_of:.1f} %",
+        f"gain {gains['before']} mm before, {gains['after']} mm after",
     ]
 
 
