@@ -120,8 +120,8 @@ class Plan:
         for name in self.controllers:
             place = name.removesuffix(PERFECT).rpartition(":")[0]
             if place:  # a user's own
-                found = None if place.endswith(".py") else find_spec(place)
-                files.append(place if found is None else str(found.origin))
+                module = None if place.endswith(".py") else find_spec(place)
+                files.append(place if module is None else str(module.origin))
         named |= {"with": {name: version(name) for name in ("numpy", "numba", "pin", "mujoco")}}
         found = {path: _digest(_inside(Path(path))) for path in files}
         if self.robot not in bundled_robots():  # whose files are part of the code
