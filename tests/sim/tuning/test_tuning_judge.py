@@ -54,6 +54,15 @@ def test_better_in_both_better_in_one_and_a_trade_are_told_apart() -> None:
     trade = judged(distance=near, lost_time=ROWS["lost_time"] + 0.25)
     assert not trade.worth
     assert "trade" in sentence(trade)
+    noise = np.random.default_rng(3).normal(0.0, 0.05, len(ROWS["distance"]))
+    maybe = next(
+        found
+        for found in (judged(distance=ROWS["distance"] + sign * noise, lost_time=quick) for sign in (1.0, -1.0))
+        if found.means["harm"].difference.value > 0.0
+    )
+    assert not maybe.worse("harm")
+    assert not maybe.worth
+    assert sentence(maybe).startswith("The tuned values are better in work lost, and may do more harm;")
     worse = judged(distance=ROWS["distance"] - 0.05)
     assert not worse.worth
     assert sentence(worse).startswith("The present values were already as good")
