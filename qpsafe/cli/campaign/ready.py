@@ -28,7 +28,7 @@ def plan_for_its_robot(where: str, plan: Plan, named: bool) -> Plan:
     from qpsafe.robot.loader import bundled_robots, find_robot
 
     if plan.robot not in bundled_robots():
-        ready = any_robot(where, plan.robot, own_folder(plan.robot), console(True), joints=4)
+        ready = any_robot(where, plan.robot, own_folder(plan.robot), console(True), 4, "pick" in plan.motions)
         if (
             find_robot(plan.robot).suffix != ".toml"
             or ready.folder.resolve() != find_robot(plan.robot).parent.resolve()

@@ -29,7 +29,7 @@ def own_folder(name: str) -> Path:
     return Path("out/robots") / f"{word}-{mark}"
 
 
-def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6) -> Robot:
+def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6, picks: bool = False) -> Robot:
     """The robot that is meant, with a home posture and sensors.
 
     Args:
@@ -38,12 +38,14 @@ def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6
         out: Folder of the results; what is chosen for a robot is written there.
         screen: Where it is said.
         joints: How many must carry the tool, at least.
+        picks: Whether it is to pick and place, with no chosen sensor that would take the cell for danger.
 
     Raises:
         ConfigurationError: The robot cannot do what the command shows.
     """
+    from qpsafe.sim.experiments.pick_place.for_robot import in_the_way
     from qpsafe.sim.experiments.shared.ready import made_ready
 
-    ready = made_ready(where, name, out, joints)
+    ready = made_ready(where, name, out, joints, in_the_way if picks else None)
     say(screen, f"{ready.robot.name}:", ready.said)
     return ready.robot

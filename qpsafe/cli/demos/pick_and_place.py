@@ -86,9 +86,9 @@ def pick_and_place(
     from qpsafe.sim.experiments.pick_place.settings import PEOPLE
     from qpsafe.sim.world.known import known_obstacles
 
-    machine = any_robot("qpsafe demo pick-and-place", robot, out, screen)
-    if machine.name != ROBOT:
+    if robot != ROBOT:
         screen.print("looking for a layout of the cell that suits the arm (up to a minute) ...", style="dim")
+    machine = any_robot("qpsafe demo pick-and-place", robot, out, screen, picks=program is None)
     experiment = PickPlaceExperiment(
         machine,
         make_law(law, projection, solver),

@@ -29,7 +29,9 @@ from qpsafe.tasks.reach import UnreachableError, joints_for
 from qpsafe.tasks.rotation import euler_zyx, exp3
 
 if TYPE_CHECKING:
+    from qpsafe.check.check import PathCheck
     from qpsafe.robot.robot import Robot
+    from qpsafe.tasks.program import Program
 
 Array = NDArray[np.float64]
 
@@ -76,10 +78,35 @@ def work_for(robot: Robot) -> Work:
     Raises:
         ConfigurationError: None was found; says what is wrong with the best.
     """
+    return _work(robot, sensors=True)
+
+
+def in_the_way(robot: Robot) -> frozenset[str]:
+    """Names of the sensors without which there is work for a robot: they would take what stands there for danger.
+
+    Args:
+        robot: One whose sensors may be put elsewhere.
+
+    Returns:
+        None of them where there is work with all, or where they are not what is wrong.
+    """
+    try:
+        work_for(robot)
+    except ConfigurationError:
+        try:
+            work = _work(robot, sensors=False)
+        except ConfigurationError:
+            return frozenset()
+        found = _checked(robot, work.cell, parse_program(work.program, "the work chosen", robot), True)
+        return frozenset(seen.spot for seen in found.sightings or ())
+    return frozenset()
+
+
+def _work(robot: Robot, sensors: bool) -> Work:
     if robot.name == ROBOT:
         return Work(Cell(), PROGRAM.read_text(encoding="utf-8"), HANDS - TABLE_TOP, robot.name)
     arm, usual = Arm.of(robot), PROGRAM.read_text(encoding="utf-8")
-    if not _wrong(robot, Cell(), usual):
+    if not _wrong(robot, Cell(), usual, sensors):
         return Work(Cell(), usual, HANDS - TABLE_TOP, robot.name)
     axis = tool_axis(robot, arm.tool)
     _check_tip(robot, arm.tool, axis)
@@ -99,7 +126,7 @@ def work_for(robot: Robot) -> Work:
     wrong = "no hole of the support and the box were both in reach, tool down"
     for (_, cell, turn), rates in product(found[:TRIED], RATES):
         text = _program(arm.tool, cell, turn, rates)
-        wrong = _wrong(robot, cell, text)
+        wrong = _wrong(robot, cell, text, sensors)
         if not wrong:
             return Work(cell, text, HANDS - cell.top, robot.name)
     expected = f"one that reaches support and box of some layout, tool down, or people and a --program for it ({wrong})"
@@ -125,14 +152,19 @@ def _check_tip(robot: Robot, tool: str, axis: Array) -> None:
         raise ConfigurationError("the third experiment", "robot", found, expected)
 
 
-def _wrong(robot: Robot, cell: Cell, text: str) -> str:
+def _wrong(robot: Robot, cell: Cell, text: str, sensors: bool) -> str:
     """What is wrong with a program in a cell, in words; nothing if it can be run."""
     try:
         program = parse_program(text, f"the work chosen for {robot.name}", robot)
     except ProgramError as problem:
         return problem.expected
+    return "; ".join(troubles(_checked(robot, cell, program, sensors)))
+
+
+def _checked(robot: Robot, cell: Cell, program: Program, sensors: bool) -> PathCheck:
+    """A program in a cell, with the robot's sensors or without."""
     scene = build_scene(robot, pedestal=HANDS - cell.top, people=(), furnish=cell.furnish)
-    return "; ".join(troubles(check_path(robot, program, known=known_obstacles(scene))))
+    return check_path(robot, program, known=known_obstacles(scene), sensors=sensors)
 
 
 def _cell(scale: float, top: float) -> Cell:

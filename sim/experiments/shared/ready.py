@@ -6,6 +6,8 @@ and used for the next run: the experiment runs on that folder, as it would on on
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Callable, Collection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
@@ -41,7 +43,9 @@ class Ready(NamedTuple):
     said: tuple[str, ...] = ()
 
 
-def made_ready(where: str, name: str, out: Path, joints: int = 4) -> Ready:
+def made_ready(
+    where: str, name: str, out: Path, joints: int = 4, in_the_way: Callable[[Robot], Collection[str]] | None = None
+) -> Ready:
     """Load a robot and give it what it lacks; nothing is written for one that lacks nothing.
 
     Args:
@@ -49,6 +53,7 @@ def made_ready(where: str, name: str, out: Path, joints: int = 4) -> Ready:
         name: A bundled name, a robot folder, an MJCF or URDF file, or a model of another package.
         out: Where a folder `robot` is made, if need be.
         joints: How many must carry the tool, at least.
+        in_the_way: Names those of chosen sensors that the robot's work does not go with; they are taken off again.
 
     Raises:
         ConfigurationError: The robot cannot do what the command shows; says why, before anything is written.
@@ -75,8 +80,26 @@ def made_ready(where: str, name: str, out: Path, joints: int = 4) -> Ready:
         said.append(f"{count} distance sensors put on its links")
     else:
         return Ready(robot, tuple(said))
+    off = () if in_the_way is None else in_the_way(load_quietly(folder))
+    file = folder / "spots.toml"
+    text = without(file.read_text(encoding="utf-8"), off)
+    if off and "[[spot]]" in text:
+        file.write_text(text, encoding="utf-8")
+        said.append(f"{counted(len(off), 'sensor')} taken off again: what stands in its cell would count as danger")
     said.append(f"written to {folder}: correct it, and give it as --robot")
     return Ready(load_quietly(folder), tuple(said))
+
+
+def without(spots_toml: str, names: Collection[str]) -> str:
+    """The text of a file of sensors that was written here, without some of them.
+
+    Args:
+        spots_toml: The text.
+        names: Of those that are left out.
+    """
+    head, *tables = spots_toml.split("\n[[spot]]\n")
+    kept = [table for table in tables if tomllib.loads(table)["name"] not in names]
+    return "\n[[spot]]\n".join((head, *kept))
 
 
 class Choices(NamedTuple):
