@@ -194,8 +194,8 @@ def sentence(judged: Judged) -> str:
         return f"The tuned values are better in {gained}, and not surely worse in the other: {figures}"
     if any(map(judged.better, ("harm", "lost"))):
         surely = any(map(judged.worse, ("harm", "lost")))
-        said = "trade one for the other" if surely else "are better in work lost, and may do more harm"
-        return f"The tuned values {said}; it is for you to choose: {figures}"
+        how = "trade one for the other" if surely else "are better in work lost, and may do more harm"
+        return f"The tuned values {how}; it is for you to choose: {figures}"
     return f"The present values were already as good: {figures}"
 
 

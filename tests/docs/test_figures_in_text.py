@@ -217,19 +217,21 @@ def recovery() -> list[str]:
 def any_robot() -> list[str]:
     found = measured("other-robots")
     kept = {name for name, run in found.items() if run["code"] == 0}
-    assert kept == {"fixed ur5", "fixed panda", "fixed xarm7", "path xarm7", "pick ur5"}
-    (missed,) = found["fixed kinova"]["missed"]
-    (approach,) = (
-        one for one in found["fixed kinova"]["approaches"] if missed["name"].endswith(f"{one['start']:.1f} s")
-    )
-    nearer = 1e3 * (approach["without_controller"] - approach["with_controller"])
+    assert kept == {"fixed ur5", "fixed panda", "fixed xarm7", "fixed kinova", "path xarm7", "pick ur5"}
+    ways = {
+        name: [1e3 * (one["with_controller"] - one["without_controller"]) for one in run["approaches"]]
+        for name, run in found.items()
+        if name.startswith("fixed")
+    }
+    gained = sorted(way for some in ways.values() for way in some)
+    assert sum(way < 1.0 for way in ways["fixed ur5"]) == sum(way < 1.0 for way in gained) == 1
     (run,) = found["pick ur5"]["runs"]
     assert run["contacts"] == run["lost"] == 0
     assert run["taken"] == 1
     assert "some layout" in found["pick irb14000"]["refused"]
     (finger,) = re.findall(r"reaches (\S+ mm) beyond", found["pick panda"]["refused"])
     return [
-        f"it ends one approach {nearer:.0f} mm nearer to the board, at {approach['with_controller']:.2f} m",
+        f"end an approach {gained[0]:.0f} to {gained[-1]:.0f} mm farther from the board",
         f"({run['delivered']} cycles, nearest {1e3 * run['nearest']:.0f} mm, no contact)",
         f"a finger reaches {finger} beyond its tool's frame",
     ]
