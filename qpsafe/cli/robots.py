@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import Group, console, print_json
+from qpsafe.cli.common import Group, console, print_json, write_text
 from qpsafe.cli.outputs import output_folder, try_folder
 from qpsafe.text.words import counted
 
@@ -138,16 +138,16 @@ def add(
     if path.exists() and not force:
         raise ConfigurationError("robots add", "robot.toml", str(path), "no such file yet; --force writes over it")
     try_folder("qpsafe robots add", "FILE" if out is None else "--out", folder)
-    folder.mkdir(parents=True, exist_ok=True)
     text, spots, said = _first_files(robot, folder)
+    folder.mkdir(parents=True, exist_ok=True)
     try:
         part.write_text(text, encoding="utf-8")
         again = load_quietly(robot.model_path, part)  # what does not load is not written
+        if spots is not None:
+            write_text(folder / "spots.toml", spots)  # before the file that names it
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-    if spots is not None:
-        (folder / "spots.toml").write_text(spots, encoding="utf-8")
     if json:
         print_json({"file": str(path), "name": again.name, "joints": again.nq, "notes": said})
         return

@@ -66,6 +66,8 @@ def tune(
     """
     screen = console(json)
     require("tune", WHERE, "optuna", "pyarrow")
+    from qpsafe.robot.loader import load_quietly
+    from qpsafe.sim.experiments.shared.folder import check_place
     from qpsafe.sim.tuning.finals import MOST as FINALS
     from qpsafe.sim.tuning.front import PREFERENCES
     from qpsafe.sim.tuning.search import MOST, Search
@@ -81,6 +83,7 @@ def tune(
     plan = _plan(robot, program, cell, people)
     search = Search(plan, seed)
     folder = Path("out") / f"tune-{search.plan.digest()[:8]}" if out is None else out
+    check_place(load_quietly(plan.robot), folder / "robot")  # where the copy with the values goes
     with executor_at(dask) as executor, _kept(folder, screen):
         crew = {"executor": executor, "workers": workers}
         journal = _searched(search, trials, folder, minutes, screen, crew)

@@ -66,6 +66,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         return found | pick_settings(experiment)
     found |= {name: getattr(experiment, name) for name in PLAIN} | {
         "kind": kind,
+        "asked_parameters": experiment.parameters,
         "story": None if story is None else {"floor": story.floor, **story.table.model_dump(mode="json")},
         "choreography": _choreography(experiment.choreography) if story is None else None,
         "cell": [[obstacle.name, obstacle.vertices.tolist()] for obstacle in experiment.cell],
@@ -94,7 +95,7 @@ def experiment_of(settings: Mapping[str, Any]) -> Experiment:
         options |= {name: settings[name] for name in PLAIN}
         furniture = settings.get("cell", ())  # older runs had none
         options["cell"] = tuple(Obstacle(name, np.array(vertices)) for name, vertices in furniture)
-        options["parameters"] = settings.get("parameters", "paper")
+        options["parameters"] = settings.get("asked_parameters")  # older runs had the default
         if settings["story"] is not None:
             options["story"] = _story_of(settings["story"])
         else:

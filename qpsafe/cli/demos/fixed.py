@@ -67,8 +67,9 @@ def fixed(
     ] = None,
     story: Annotated[Path | None, typer.Option(help="TOML file of a story, instead of the paper's.")] = None,
     parameters: Annotated[
-        str, typer.Option(help="paper: the paper's, whatever the robot's file states; robot: those of its file.")
-    ] = "paper",
+        str | None,
+        typer.Option(help="paper: the paper's, as without --story; robot: those of the robot's file, as with it."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path("out/demo-fixed"),
     video: Annotated[bool, typer.Option(help="Write an mp4; needs OpenGL.")] = True,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer; needs a display.")] = False,
@@ -80,7 +81,7 @@ def fixed(
     screen = console(json)
     if spots is not None and robot == "all":
         raise ConfigurationError("qpsafe demo fixed", "spots", spots, "one robot, not 'all': sensors fit one robot")
-    if parameters not in ("paper", "robot"):
+    if parameters not in (None, "paper", "robot"):
         raise ConfigurationError("qpsafe demo fixed", "--parameters", parameters, "paper or robot")
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.sim.experiments.encounter import encounter
@@ -114,7 +115,7 @@ def fixed(
 
     title = f"{law.value} law" + (f", {projection.value} projection" if law is LawName.hierarchical else "")
     title += "" if sensor == "ideal" else f", sensors {sensor}"
-    title += "" if parameters == "paper" else ", the robot's own parameters"
+    title += "" if parameters is None else f", parameters: {parameters}"
     if robot == "all":
 
         def run(experiment: FixedExperiment, folder: Path) -> Report:

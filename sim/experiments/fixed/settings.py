@@ -34,7 +34,7 @@ class FixedSettings(Control):
 
     With the choreography, which shows Table I, thresholds, evasion, sensing and recovery are the paper's unless they
     are given, whatever the robot's file states: people count as standing still, so that levels of danger are passed one
-    by one. With a story, or `parameters="robot"`, they are the controller's default.
+    by one. With a story they are the controller's default; `parameters` says otherwise for either.
 
     Attributes:
         robot: The robot, with spots.
@@ -52,7 +52,8 @@ class FixedSettings(Control):
         recovery: How the robot returns to its path; None for the default, see above.
         story: Who does what instead of the choreography; `seed` varies it too.
         cell: Furniture besides the pedestal: it stands in the scene, and the controller knows it.
-        parameters: With the choreography: "paper", or "robot" for what the robot's file states, as after tuning.
+        parameters: "paper", or "robot" for what the robot's file states, as after tuning; None for the default, see
+            above.
     """
 
     robot: Robot
@@ -68,16 +69,21 @@ class FixedSettings(Control):
     recovery: RecoveryRules | None = None
     story: Story | None = None
     cell: tuple[Obstacle, ...] = ()
-    parameters: str = "paper"
+    parameters: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.story is None:
-            self.robot = self.robot.with_parameters(self.parameters)
+        own = "paper" if self._as_in_paper else self.parameters
+        if own is not None:
+            self.robot = self.robot.with_parameters(own)
         if self.robot.spots_path is None and sensor_kinds(self.sensor).spots in ("ideal", "sharp"):
             raise RobotFileError(self.robot.name, "spots", None, "distance sensors: the experiment needs a spots.toml")
         if self.choreography is None:
             self.choreography = robot_stage(self.robot).choreography
+
+    @property
+    def _as_in_paper(self) -> bool:
+        return self.parameters == "paper" or (self.parameters is None and self.story is None)
 
     def parts(self) -> dict[str, Any]:
         """Parts of the controller as arguments of `SafetyController`; None for its default."""
@@ -87,7 +93,7 @@ class FixedSettings(Control):
             found["range_sensors"] = range_sensors(kinds.ranging, self.robot)[0]
             if kinds.spots is None:
                 found["spots"] = "off"
-        if self.story is None and self.parameters == "paper":
+        if self._as_in_paper:
             paper = {"evasion": "paper", "sensing": SensingRules(velocities=False), "recovery": RecoveryRules.paper()}
             found |= {name: part for name, part in paper.items() if found[name] is None}
         return found

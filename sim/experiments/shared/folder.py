@@ -29,18 +29,19 @@ def copied_folder(robot: Robot, folder: Path, spots: str | None = None) -> Path:
 
     Args:
         robot: Loaded from a folder.
-        folder: The copy's; what was there is replaced.
+        folder: The copy's; files there that it writes, and all of sensors, are replaced.
         spots: Text of a file of distance sensors for a robot that has none.
 
     Returns:
         The folder.
 
     Raises:
-        ConfigurationError: Its `robot.toml` names its model in a way that cannot be edited.
+        ConfigurationError: Its `robot.toml` names its model in a way that cannot be edited, or its files lie there.
     """
+    check_place(robot, folder)
     if robot.folder.resolve() in [path.parent.resolve() for path in map(find_robot, bundled_robots())]:
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(robot.folder, folder, ignore=shutil.ignore_patterns("__pycache__"))
+        _clear(folder)
+        shutil.copytree(robot.folder, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
         return folder
     text = (robot.folder / "robot.toml").read_text(encoding="utf-8-sig")
     sensors = {path.name: path for path in robot.folder.glob(SENSORS)}
@@ -57,17 +58,38 @@ def copied_folder(robot: Robot, folder: Path, spots: str | None = None) -> Path:
         mesh = Path(region.get("mesh", "/"))
         if not mesh.is_absolute() and ".." not in mesh.parts and (robot.folder / mesh).is_file():
             sensors[str(mesh)] = robot.folder / mesh
-    kept = {name: path.read_bytes() for name, path in sensors.items()}  # they may lie in the folder that is replaced
+    kept = {name: path.read_bytes() for name, path in sensors.items()}
     if spots is not None:
         kept["spots.toml"] = spots.encode()
-    if folder.exists():
-        shutil.rmtree(folder)
-    folder.mkdir(parents=True)
+    _clear(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     for name, content in kept.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     (folder / "robot.toml").write_text(changed, encoding="utf-8")
     return folder
+
+
+def check_place(robot: Robot, folder: Path) -> None:
+    """Refuse to write a copy over the robot itself.
+
+    Args:
+        robot: Loaded from a folder.
+        folder: Where its copy is to be.
+
+    Raises:
+        ConfigurationError: The robot's own files, or its model, lie there.
+    """
+    place = folder.resolve()
+    if place == robot.folder.resolve() or place in robot.model_path.resolve().parents:
+        expected = f"another folder for the results: the files of {robot.name} lie there"
+        raise ConfigurationError("a robot's copy", "folder", str(folder), expected)
+
+
+def _clear(folder: Path) -> None:
+    """Take away files of an earlier robot that would be taken for this one's."""
+    for path in (*folder.glob(SENSORS), folder / "robot.toml"):
+        path.unlink(missing_ok=True)
 
 
 def with_keys(text: str, stated: dict[str, str]) -> str | None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
-from typing import Any
 
+import made_up_arm
+import other_arms
 import pytest
 from typer.testing import CliRunner
 
@@ -17,21 +16,6 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_quietly
 from qpsafe.sensing.spots import load_spots
 
-ROOT = Path(__file__).resolve().parents[3]
-
-
-def _module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-ARMS, MADE_UP = _module(ROOT / "tests" / "sim" / "arms.py"), _module(ROOT / "benchmarks" / "made_up_arm.py")
-
 
 @pytest.fixture(autouse=True)
 def _here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -41,7 +25,7 @@ def _here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def blunt(folder: Path) -> Path:
     """The made-up arm with a last link that reaches beyond its tool: no plate for it to work at."""
     file = folder / "blunt.urdf"
-    text = MADE_UP.arm_urdf().replace(
+    text = made_up_arm.arm_urdf().replace(
         '<origin xyz="0.14 0 0" rpy="0 1.570796 0" />', '<origin xyz="0.01 0 0" rpy="0 1.570796 0" />'
     )
     file.write_text(text, encoding="utf-8")
@@ -61,13 +45,13 @@ def test_motions_that_nobody_named_and_it_cannot_do_are_left_out(tmp_path: Path,
 
 
 def test_an_arm_of_five_joints_holds(tmp_path: Path) -> None:
-    motions = make_plan(None, robot=str(ARMS.write_arm(tmp_path, ARMS.SIX[:5]))).motions
+    motions = make_plan(None, robot=str(other_arms.write_arm(tmp_path, other_arms.SIX[:5]))).motions
     assert "hold" in motions
     assert "line" not in motions
 
 
 def test_a_folder_that_was_added_is_the_robot_of_every_command(tmp_path: Path) -> None:
-    (tmp_path / "arm.urdf").write_text(MADE_UP.arm_urdf(), encoding="utf-8")
+    (tmp_path / "arm.urdf").write_text(made_up_arm.arm_urdf(), encoding="utf-8")
     result = CliRunner().invoke(app, ["robots", "add", "arm.urdf", "--out", "arm"])
     assert result.exit_code == 0, result.output
     assert "home posture chosen" in " ".join(result.output.split())
@@ -80,7 +64,7 @@ def test_a_folder_that_was_added_is_the_robot_of_every_command(tmp_path: Path) -
 
 
 def test_sensors_that_are_there_are_kept(tmp_path: Path) -> None:
-    (tmp_path / "arm.urdf").write_text(MADE_UP.arm_urdf(), encoding="utf-8")
+    (tmp_path / "arm.urdf").write_text(made_up_arm.arm_urdf(), encoding="utf-8")
     (tmp_path / "spots.toml").write_text("# mine\n")
     assert CliRunner().invoke(app, ["robots", "add", "arm.urdf"]).exit_code == 0
     assert (tmp_path / "spots.toml").read_text() == "# mine\n"
@@ -88,7 +72,7 @@ def test_sensors_that_are_there_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_sensors_gets_some_in_a_copy(tmp_path: Path) -> None:
-    file = ARMS.write_arm(tmp_path)
+    file = other_arms.write_arm(tmp_path)
     folder = tmp_path / "mine"
     assert CliRunner().invoke(app, ["robots", "add", str(file), "--out", str(folder)]).exit_code == 0
     (folder / "spots.toml").unlink()
@@ -112,7 +96,7 @@ def test_models_of_one_name_do_not_share_a_folder(tmp_path: Path, monkeypatch: p
 
 
 def test_what_is_no_arm_is_added_as_its_file_says(tmp_path: Path) -> None:
-    file = ARMS.write_arm(tmp_path, tuple((tuple(9.0 * x for x in xyz), *rest) for xyz, *rest in ARMS.SIX))
+    file = other_arms.write_arm(tmp_path, tuple((tuple(9.0 * x for x in xyz), *rest) for xyz, *rest in other_arms.SIX))
     result = CliRunner().invoke(app, ["robots", "add", str(file), "--out", "huge"])
     assert result.exit_code == 0, result.output
     assert "no home posture and no sensors are chosen" in " ".join(result.output.split())

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, load_quietly
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.starting_file import starting_robot_toml
@@ -99,6 +100,28 @@ def test_sensors_of_another_kind_and_meshes_of_regions_go_along(tmp_path: Path) 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load_quietly(folder)
+
+
+@pytest.mark.parametrize("bundled", [False, True])
+def test_nothing_of_anybody_elses_is_deleted(bundled: bool, tmp_path: Path) -> None:
+    robot = load_quietly("irb140") if bundled else described(package(tmp_path / "ws", MESHES[1]))
+    place = tmp_path / "results" / "robot"
+    (place / "notes").mkdir(parents=True)
+    (place / "notes" / "mine.txt").write_text("mine")
+    (place / "spots-by-hand.toml").write_text("# of an earlier robot\n")
+    copied_folder(robot, place)
+    assert (place / "notes" / "mine.txt").read_text() == "mine"
+    assert (place / "spots-by-hand.toml").exists() == (robot.folder / "spots-by-hand.toml").exists()
+
+
+@pytest.mark.parametrize("up", [0, 1])
+def test_a_copy_over_the_robot_itself_is_refused_and_leaves_it_as_it_is(up: int, tmp_path: Path) -> None:
+    robot = described(package(tmp_path, MESHES[1]))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    place = (robot.folder, *robot.folder.parents)[up]
+    with pytest.raises(ConfigurationError, match="the files of arm lie there"):
+        copied_folder(robot, place)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc")), min_size=1, max_size=20)

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
+from qpsafe.sim.experiments.fast_person import STORY
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.replay.settings import controller_of, experiment_of, settings_of
+from qpsafe.sim.stories.file import load_story
 from qpsafe.sim.tuning.robot_file import write_folder
 from qpsafe.sim.tuning.space import Space
 
@@ -35,6 +37,18 @@ def test_parameters_are_those_that_were_asked_for(name: str, parameters: str, tm
     again = experiment_of(json.loads(json.dumps(settings_of(experiment))))
     assert again.parameters == parameters
     np.testing.assert_array_equal(again.run().q_ref, experiment.run().q_ref)
+
+
+@pytest.mark.parametrize("loaded", ["paper", "robot"])
+@pytest.mark.parametrize("parameters", [None, "paper", "robot"])
+def test_a_story_has_the_robots_own_unless_they_are_asked_for(parameters: str | None, loaded: str) -> None:
+    robot = load_robot("irb140", parameters=loaded)
+    experiment = FixedExperiment(robot, duration=0.02, story=load_story(STORY), parameters=parameters)
+    paper = parameters == "paper"
+    assert (controller_of(experiment).evasion.mass[0, 0] == 4.0) == paper
+    again = experiment_of(json.loads(json.dumps(settings_of(experiment))))
+    np.testing.assert_array_equal(again.run().q_ref, experiment.run().q_ref)
+    assert np.array_equal(controller_of(again).evasion.mass, controller_of(experiment).evasion.mass)
 
 
 def test_what_is_neither_is_refused(tmp_path: Path) -> None:
