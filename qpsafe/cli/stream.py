@@ -73,6 +73,9 @@ def stream(
     patience: Annotated[
         float, typer.Option(min=0.0, help="Stop after this silence of a robot that was answered [s]; 0: never.")
     ] = 15.0,
+    silence: Annotated[
+        float, typer.Option(min=0.01, max=60.0, help="Hold the robot after this silence of it [s].")
+    ] = 0.1,
     ramp_in: Annotated[
         float, typer.Option(min=0.01, max=10.0, help="Time to blend in from the measured pose [s].")
     ] = 0.5,
@@ -162,7 +165,8 @@ def stream(
         grants += _grants(real_time, priority, [spoken.thread, written.thread])
         speaker = Speaker(spoken, streamer, inlet, status=sys.stderr.isatty() and not json)
         supervisor = Supervisor(on_transition=speaker.say)
-        loop = StreamLoop(controller, streamer.session, supervisor, LoopRules(manual=acknowledge is Acknowledge.manual))
+        lets = LoopRules(silence=silence, manual=acknowledge is Acknowledge.manual)
+        loop = StreamLoop(controller, streamer.session, supervisor, lets)
         _announce(screen, grants, streamer.address, inlet, blind)
 
         def on_tick(tick: Tick | None) -> None:

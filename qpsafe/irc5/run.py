@@ -20,6 +20,7 @@ from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]
 CHECK = 0.05  # time between two looks at the helpers [s]
+GONE = 1.0  # a robot silent for so long is not waited for when the stream is to end [s]
 STEADY = 5.0  # memory is compared from this time of the stream on [s]
 
 #: A helper of the loop: says what is wrong with it at a time of the monotonic clock [s], or nothing.
@@ -140,7 +141,8 @@ def run_stream(
                 loop.silent(run.silent)
                 if run.answered and run.silent >= patience:
                     leave(f"{ROBOT}silent for {patience:g} s")
-                if loop.leaving and (run.silent > loop.rules.silence or not run.answered):  # nobody to ramp out for
+                gone = run.silent > min(loop.rules.silence, GONE) or not run.answered
+                if loop.leaving and gone:  # nobody to ramp out for
                     break
                 continue
             heard = now

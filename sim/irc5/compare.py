@@ -82,24 +82,29 @@ def stream_process(*options: str, patience: float = 120.0) -> Iterator[StreamPro
     try:
         if not ready.wait(patience) or "the robot" not in found.addresses:
             raise QpsafeError("qpsafe stream did not come up: " + " / ".join(found.said[-5:]))
-        yield found
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        output, _ = _communicate(process)
-        listener.join(10.0)
-        found.report = json.loads(output) if output.strip() else {}
+        try:
+            yield found
+        except QpsafeError as error:  # it may know why
+            _leave(found, listener)
+            error.add_note(f"qpsafe stream: {found.said[-10:]}, {found.report.get('transitions', found.report)}")
+            raise
+        _leave(found, listener)
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
 
 
-def _communicate(process: subprocess.Popen[str]) -> tuple[str, None]:
-    """Standard output to its end; standard error has its own reader."""
+def _leave(stream: StreamProcess, listener: threading.Thread) -> None:
+    """Ask it to leave if it has not left, and take its report; standard error has its own reader."""
+    process = stream.process
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
     assert process.stdout is not None
     output = process.stdout.read()
     process.wait(timeout=60.0)
-    return output, None
+    listener.join(10.0)
+    stream.report = json.loads(output) if output.strip() else {}
 
 
 class Course(NamedTuple):
@@ -178,9 +183,11 @@ def over_the_wire(
         lockstep: Whether a packet waits for its answer.
         cycles: Of the third experiment.
     """
-    with contextlib.closing(UdpExchange(axes_of_robot(robot), None, lockstep=5.0 if lockstep else 0.0)) as exchange:
+    with contextlib.closing(UdpExchange(axes_of_robot(robot), None, lockstep=60.0 if lockstep else 0.0)) as exchange:
         events = "{}:{}".format(*exchange.events)
-        with stream_process("--experiment", name, "--events", events, *options) as stream:
+        # who waits for each other keeps no real time: on a busy machine either may be late
+        timeless = ["--watchdog", "0", "--silence", "60"] if lockstep else []
+        with stream_process("--experiment", name, "--events", events, *timeless, *options) as stream:
             exchange.aim(stream.addresses["the robot"], stream.addresses["distances"])
             run = Irc5Loop(experiment_loop(name, robot)[0], exchange, settings)
             over = partial(_over, run, cycles)

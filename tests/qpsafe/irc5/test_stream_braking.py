@@ -18,11 +18,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.irc5.loop import StreamLoop
+from qpsafe.irc5.loop import LoopRules, StreamLoop
 from qpsafe.irc5.messages import decode_sensor, encode_robot
 from qpsafe.irc5.requests import LEAVE, Requests
 from qpsafe.irc5.rules import SessionRules
-from qpsafe.irc5.run import CHECK, StreamRun, run_stream
+from qpsafe.irc5.run import CHECK, GONE, StreamRun, run_stream
 from qpsafe.irc5.session import Cycle, EgmSession
 from qpsafe.irc5.supervisor import State, Supervisor, Transition
 from qpsafe.limits import JointLimits
@@ -229,6 +229,23 @@ def test_the_stream_ends_some_time_after_the_robot_has(stops_first: bool) -> Non
     assert run.at_rest is stops_first
     assert run.good is stops_first
     assert "silent for 2 s" in stage.loop.supervisor.causes[-1]
+
+
+@pytest.mark.parametrize("silence", [0.05, 0.1, 0.7, 2.0, 60.0])
+def test_a_stream_that_is_to_end_does_not_wait_long_for_a_robot_that_has_gone(silence: float) -> None:
+    """However patient it is with one that it drives: that one is held after the silence, and may speak again."""
+    stage = Stage({}, silent_after=200)
+    stage.loop.rules = LoopRules(silence=silence)
+    asked = Requests()
+
+    def leave(run: StreamRun) -> None:
+        if run.silent > 0.0:
+            asked.leave = "enough"
+
+    run = stage.run(requests=asked, on_second=leave)
+    assert run.silent <= max(min(silence, GONE), 0.2) + 0.05  # it is asked 0.2 s after the last packet
+    assert run.silent >= min(silence, GONE)
+    assert run.troubles == []
 
 
 def test_events_are_in_the_report_whether_anybody_is_told_or_not() -> None:
