@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 import qpsafe
+from qpsafe.sim.campaign.executors import dask_executor
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.trial import run_trial
 from qpsafe.sim.tuning.ask import BATCH
+from qpsafe.sim.tuning.journal import Journal
 from qpsafe.sim.tuning.objectives import Outcome
 from qpsafe.sim.tuning.play import Piece, play_piece
 from qpsafe.sim.tuning.robot_file import write_folder
@@ -38,6 +40,27 @@ def test_values_of_another_robots_file_play_as_that_robot_does(tmp_path: Path) -
     loaded = Outcome.of(run_trial(replace(plan, robot=str(folder)), 0)[0])
     assert tuned.harm == pytest.approx(loaded.harm, rel=1e-6)
     assert tuned.lost == pytest.approx(loaded.lost, abs=0.02)
+
+
+@pytest.mark.slow
+def test_two_dask_workers_play_the_trials_of_one_process_also_after_an_interruption(tmp_path: Path) -> None:
+    """Real encounters in real processes: the same questions in the same order, and the same answers to the bit."""
+    distributed = pytest.importorskip("distributed")
+    search = Search(Plan(), 97, Rungs((6, 12, 18), lagged=3))
+    straight = run_search(search, 1 + 2 * BATCH).trials
+    file = tmp_path / "search.jsonl"
+
+    def stopping(done: int, journal: Journal) -> None:
+        if done > 1:
+            raise KeyboardInterrupt
+
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster, dask_executor(cluster.scheduler_address) as executor:
+        with pytest.raises(KeyboardInterrupt):
+            run_search(search, 1 + 2 * BATCH, file, executor, stopping)
+        assert len(Journal(file, search.identity()).trials) == 1 + BATCH
+        assert run_search(search, 1 + 2 * BATCH, file, executor).trials == straight
+    assert len({str(trial.point) for trial in straight}) == len(straight)
 
 
 @pytest.mark.slow
