@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from browser import WIDE, Program, Tab, chromium, launched
 
-from qpsafe.irc5.latency import Latency
+from qpsafe.irc5.process.latency import Latency
 from qpsafe.sim.web.app import App
 from qpsafe.sim.web.people import PERSON, Drag
 from qpsafe.sim.web.process import LiveProcess

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from qpsafe.cli.outputs import try_file
-from qpsafe.irc5.realtime import fifo
+from qpsafe.irc5.process.realtime import fifo
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.irc5.compare import Course, agreement, in_one_process, over_the_wire
 from qpsafe.sim.irc5.motion import EgmSettings

@@ -26,12 +26,12 @@ def compared(
     trial: int, dynamics: bool = False, ticks: int | None = None, controller: str = "default"
 ) -> dict[str, Any]:
     """Differences in one trial; trials are those of a campaign whose first seed is 0."""
-    from qpsafe.sim.campaign.closest import closest
-    from qpsafe.sim.campaign.in_mujoco import reference
-    from qpsafe.sim.campaign.meeting import meeting
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.senses import Senses
-    from qpsafe.sim.campaign.trial import recorded
+    from qpsafe.sim.campaign.trials.closest import closest
+    from qpsafe.sim.campaign.trials.in_mujoco import reference
+    from qpsafe.sim.campaign.trials.meeting import meeting
+    from qpsafe.sim.campaign.trials.senses import Senses
+    from qpsafe.sim.campaign.trials.trial import recorded
 
     plan = Plan(controllers=(controller,))
     met = meeting(plan, trial)

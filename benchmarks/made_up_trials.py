@@ -71,7 +71,7 @@ def row(plan: Plan, trial: int, name: str, luck: float, unseen: bool) -> dict[st
         luck: Of the trial, shared by its controllers, 0 to 1.
         unseen: Whether nobody could see them coming.
     """
-    from qpsafe.sim.campaign.rows import COLUMNS
+    from qpsafe.sim.campaign.trials.rows import COLUMNS
 
     rng = np.random.default_rng((plan.seed_of(trial), sum(map(ord, name))))
     chance, moves, approaches, lost, added = MANNERS.get(name, MANNERS["default"])

@@ -17,8 +17,8 @@ from noted import note
 
 from qpsafe.sim.campaign.limit.folder import stored_limits
 from qpsafe.sim.campaign.report.statistics import share
-from qpsafe.sim.campaign.rows import Columns, of_controller
 from qpsafe.sim.campaign.runner import stored_results
+from qpsafe.sim.campaign.trials.rows import Columns, of_controller
 
 #: Of the contacts of a part of the robot: it stood; a motion without contact was found; surely there is none.
 COUNTED = ("contacts", "rest", "avoidable", "surely")

@@ -19,9 +19,9 @@ import numpy as np
 from noted import note
 
 from qpsafe.sim.campaign.report.summary import summary
-from qpsafe.sim.campaign.rows import Columns, joined, of_controller
 from qpsafe.sim.campaign.runner import Results
 from qpsafe.sim.campaign.store import read, stored_plan, stored_versions
+from qpsafe.sim.campaign.trials.rows import Columns, joined, of_controller
 
 #: Which controllers each file compares.
 CONTROLLERS = {

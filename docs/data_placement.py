@@ -15,11 +15,11 @@ import numpy as np
 
 import qpsafe
 from qpsafe.ranging.sensor import RangeSensor
-from qpsafe.sensing.spots import SpotArray, detected_points, load_spots, rays_in_world
-from qpsafe.sim.campaign.closest import closest
-from qpsafe.sim.campaign.meeting import meeting
+from qpsafe.sensing.skin.spots import SpotArray, detected_points, load_spots, rays_in_world
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.trial import recorded
+from qpsafe.sim.campaign.trials.closest import closest
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.trial import recorded
 from qpsafe.sim.engine.spot_rays import SpotReader
 from qpsafe.sim.engine.spot_table import SpotTable
 from qpsafe.text.json_text import json_text

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import qpsafe
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.sim.drawing.film import medium_and_high
 from qpsafe.sim.experiments.fast_person import at_speed, experiment_with
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment

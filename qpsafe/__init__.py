@@ -53,7 +53,7 @@ _PUBLIC = {
     "SensingRules": "qpsafe.sensing.rules",
     "Separation": "qpsafe.danger.separation",
     "SeparationLimit": "qpsafe.danger.separation_limit",
-    "SpotArray": "qpsafe.sensing.spots",
+    "SpotArray": "qpsafe.sensing.skin.spots",
     "StopCategory": "qpsafe.irc5.supervisor",
     "Supervisor": "qpsafe.irc5.supervisor",
     "Task": "qpsafe.tasks.task",
@@ -64,11 +64,11 @@ _PUBLIC = {
     "bundled_robots": "qpsafe.robot.loader",
     "load_cameras": "qpsafe.ranging.cell_cameras",
     "load_cell": "qpsafe.sensing.cell_file",
-    "load_converter": "qpsafe.sensing.calibration",
+    "load_converter": "qpsafe.sensing.skin.calibration",
     "load_program": "qpsafe.tasks.program_file",
     "load_range_sensors": "qpsafe.ranging.sensor_file",
     "load_robot": "qpsafe.robot.loader",
-    "load_spots": "qpsafe.sensing.spots",
+    "load_spots": "qpsafe.sensing.skin.spots",
     "nullspace_velocity": "qpsafe.laws.nullspace",
     "robot_activation": "qpsafe.danger.thresholds",
     "solve_hierarchy": "qpsafe.hqp.solve",
@@ -116,12 +116,12 @@ if TYPE_CHECKING:
     from qpsafe.robot.loader import load_robot as load_robot
     from qpsafe.robot.robot import Robot as Robot
     from qpsafe.robot.wire import Wire as Wire
-    from qpsafe.sensing.calibration import load_converter as load_converter
     from qpsafe.sensing.cell_file import load_cell as load_cell
     from qpsafe.sensing.hulls import Obstacle as Obstacle
     from qpsafe.sensing.rules import SensingRules as SensingRules
-    from qpsafe.sensing.spots import SpotArray as SpotArray
-    from qpsafe.sensing.spots import load_spots as load_spots
+    from qpsafe.sensing.skin.calibration import load_converter as load_converter
+    from qpsafe.sensing.skin.spots import SpotArray as SpotArray
+    from qpsafe.sensing.skin.spots import load_spots as load_spots
     from qpsafe.tasks.frame import FrameTask as FrameTask
     from qpsafe.tasks.frame import RelativeFrameTask as RelativeFrameTask
     from qpsafe.tasks.joint import JointTask as JointTask

@@ -42,8 +42,8 @@ from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import BadInput, as_joint_position, as_joint_velocity
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.skin.spots import SpotArray
 from qpsafe.sensing.speed_cap import slowed
-from qpsafe.sensing.spots import SpotArray
 from qpsafe.tasks.task import Task
 from qpsafe.tick import BAD_INPUT, DEGRADED, FAULT, OK, Tick
 

@@ -120,7 +120,7 @@ def rooms() -> dict[Path, list[Path]]:
 
 
 def test_no_room_is_crowded_and_no_module_is_long() -> None:
-    assert {str(room.relative_to(ROOT)): len(inside) for room, inside in rooms().items() if len(inside) > 22} == {}
+    assert {str(room.relative_to(ROOT)): len(inside) for room, inside in rooms().items() if len(inside) > 17} == {}
     lengths = {
         str(path.relative_to(ROOT)): len(path.read_text("utf-8").splitlines()) for p in rooms().values() for path in p
     }

@@ -13,9 +13,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from qpsafe.ranging.sensor_file import ArrayFile
-from qpsafe.robot.schema import RobotFile
-from qpsafe.sensing import calibration, cell_file
-from qpsafe.sensing.spot_file import SpotFile
+from qpsafe.robot.robot_file.schema import RobotFile
+from qpsafe.sensing import cell_file
+from qpsafe.sensing.skin import calibration
+from qpsafe.sensing.skin.spot_file import SpotFile
 from qpsafe.sim.campaign.people.tables import PeopleTable
 from qpsafe.sim.campaign.plan import PlanFile
 from qpsafe.sim.stories.steps import StoryTable

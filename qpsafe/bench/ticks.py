@@ -20,7 +20,7 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.tasks.orientation import OrientationTask
 from qpsafe.tasks.position import PositionTask
 from qpsafe.tasks.trajectory import FixedPose

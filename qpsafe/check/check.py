@@ -17,7 +17,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.geometry.measure import pairs_of
 from qpsafe.geometry.solids import Solids
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sensing.skin.spots import SpotArray, load_spots
 from qpsafe.tasks.program import Program
 from qpsafe.tasks.trajectory import FixedPose, Trajectory
 

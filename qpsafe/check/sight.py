@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sensing.hulls import Obstacle, half_spaces
-from qpsafe.sensing.spots import SpotArray, rays_in_world
+from qpsafe.sensing.skin.spots import SpotArray, rays_in_world
 
 if TYPE_CHECKING:
     from qpsafe.check.path import NominalPath

@@ -10,26 +10,12 @@ from typing import Annotated
 import typer
 
 from qpsafe import __version__
-from qpsafe.cli import (
-    bench,
-    calibrate,
-    calibrate_camera,
-    check,
-    compare,
-    irc5_faults,
-    irc5_sim,
-    place,
-    replay,
-    robots,
-    sick_sensors,
-    story,
-    stream,
-    tune,
-    web,
-)
+from qpsafe.cli import bench, check, compare, replay, robots, story, tune, web
 from qpsafe.cli.campaign.app import app as campaigns
 from qpsafe.cli.common import Group, console
 from qpsafe.cli.demos.app import app as demos
+from qpsafe.cli.irc5 import irc5_faults, irc5_sim, stream
+from qpsafe.cli.sensors import calibrate, calibrate_camera, place, sick_sensors
 from qpsafe.errors import QpsafeError
 
 app = typer.Typer(

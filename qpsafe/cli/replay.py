@@ -102,7 +102,7 @@ def _serve(kept: Kept, host: str, port: int, token: str | None, screen: Console)
 def _watchers(run: RunFile, experiment: Any, video: Path | None, view: bool, stack: ExitStack) -> list[Any]:
     """What draws the recorded states."""
     from qpsafe.danger.activation import Activation
-    from qpsafe.sensing.spots import load_spots
+    from qpsafe.sensing.skin.spots import load_spots
     from qpsafe.sim.drawing.film import Film, Viewer
     from qpsafe.sim.drawing.gl import gl_available
     from qpsafe.sim.recording.run_file import RunFileError

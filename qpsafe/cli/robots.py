@@ -58,7 +58,7 @@ def inspect(
     from qpsafe.cli.sheet import Sheet
     from qpsafe.danger.thresholds import robot_thresholds
     from qpsafe.ranging.sensor_file import load_range_sensors, range_sensor_files
-    from qpsafe.sensing.spots import load_spots
+    from qpsafe.sensing.skin.spots import load_spots
 
     screen = console(json)
     robot = _load(name)
@@ -171,7 +171,7 @@ def _first_files(robot: Robot, folder: Path) -> tuple[str, str | None, list[str]
     """
     from qpsafe.errors import ConfigurationError, MissingExtraError
     from qpsafe.extras import require
-    from qpsafe.robot.starting_file import starting_robot_toml
+    from qpsafe.robot.robot_file.starting_file import starting_robot_toml
 
     there = "spots.toml" if (folder / "spots.toml").exists() else None
     try:

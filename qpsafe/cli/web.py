@@ -56,7 +56,7 @@ def web(
 
     The simulation runs at 250 Hz in a process of its own. Ctrl-C ends both.
     """
-    from qpsafe.irc5 import realtime
+    from qpsafe.irc5.process import realtime
 
     realtime.one_thread()
     from qpsafe.sim.web.server import Page, check_port, need_viser, token_for

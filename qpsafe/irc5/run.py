@@ -8,14 +8,14 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from qpsafe.irc5.distances import SensorInput
-from qpsafe.irc5.latency import Latency
 from qpsafe.irc5.loop import ROBOT, StreamLoop
-from qpsafe.irc5.realtime import resident
-from qpsafe.irc5.requests import Requests
+from qpsafe.irc5.packets.distances import SensorInput
+from qpsafe.irc5.process.latency import Latency
+from qpsafe.irc5.process.realtime import resident
+from qpsafe.irc5.process.requests import Requests
+from qpsafe.irc5.process.watchdog import Watchdog
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.supervisor import State, StopCategory
-from qpsafe.irc5.watchdog import Watchdog
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]

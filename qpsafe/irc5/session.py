@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.axes import Axes, axes_of
 from qpsafe.irc5.cycle import Cycle, Phase
-from qpsafe.irc5.inbox import Arrival, Inbox, Sender
-from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
+from qpsafe.irc5.packets.axes import Axes, axes_of
+from qpsafe.irc5.packets.inbox import Arrival, Inbox, Sender
+from qpsafe.irc5.packets.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
 from qpsafe.limits import JointLimits

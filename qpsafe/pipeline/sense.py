@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-CLOUD = 1_000  # more points are reduced, see `qpsafe.ranging.cloud`
+CLOUD = 1_000  # more points are reduced, see `qpsafe.ranging.reduction.cloud`
 _NOBODY, _NOWHERE = np.empty((0, 3)), np.empty(0, dtype=np.int64)
 
 
@@ -199,7 +199,7 @@ class Sense:
 
     def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
         """The points of a cloud that count, and that it was reduced."""
-        from qpsafe.ranging.cloud import check_size, reduced  # compiled when it is asked for
+        from qpsafe.ranging.reduction.cloud import check_size, reduced  # compiled when it is asked for
 
         check_size(given)
         wire = self._robot.at(as_joint_position(q, self._robot)).wire(as_joint_velocity(qd, self._robot))

@@ -12,7 +12,7 @@ from qpsafe.sensing.health import CAPPED, CLEAR, STOPPED
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
 from qpsafe.sensing.sensing import DistanceSensing, check_surroundings
-from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sensing.skin.spots import SpotArray, load_spots
 from qpsafe.sensing.units import UnitWatch
 
 if TYPE_CHECKING:

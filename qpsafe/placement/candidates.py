@@ -18,12 +18,12 @@ from qpsafe.placement.grid import NEAREST, lattice, looks_out, thin_out
 from qpsafe.placement.sensors import Sensor
 from qpsafe.placement.sight import SelfSight, zone_rays
 from qpsafe.placement.surface import Surface, link_surface
-from qpsafe.sensing.spot import Spot, axes_along
-from qpsafe.sensing.spots import SpotArray
+from qpsafe.sensing.skin.spot import Spot, axes_along
+from qpsafe.sensing.skin.spots import SpotArray
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.spec import Region
+    from qpsafe.robot.robot_file.spec import Region
 
 Array = NDArray[np.float64]
 

@@ -20,10 +20,10 @@ from qpsafe.errors import RobotFileError
 from qpsafe.extras import require
 from qpsafe.placement.boxes import may_meet
 from qpsafe.placement.surface import model_body
-from qpsafe.robot.hulls import solid_geoms
-from qpsafe.robot.mjcf import held_positions
-from qpsafe.robot.mujoco_spec import mujoco_model
-from qpsafe.sensing.spot import axes_along
+from qpsafe.robot.models.hulls import solid_geoms
+from qpsafe.robot.models.mjcf import held_positions
+from qpsafe.robot.models.mujoco_spec import mujoco_model
+from qpsafe.sensing.skin.spot import axes_along
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

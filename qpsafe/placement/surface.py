@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
 from qpsafe.extras import require
-from qpsafe.robot.mjcf import held_positions
-from qpsafe.robot.mujoco_spec import mujoco_model
+from qpsafe.robot.models.mjcf import held_positions
+from qpsafe.robot.models.mujoco_spec import mujoco_model
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.spec import Region
+    from qpsafe.robot.robot_file.spec import Region
 
 Array = NDArray[np.float64]
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.field import DangerField
-from qpsafe.ranging.candidates_kernel import WIDTH, choose, place_all, renew
 from qpsafe.ranging.checks import check_clock, checked_sensors, mounting
 from qpsafe.ranging.configurations import Configurations
 from qpsafe.ranging.inbox import Inbox
 from qpsafe.ranging.judge import Judge
 from qpsafe.ranging.ranged import PERSON, Ranged
-from qpsafe.ranging.reduce import Reducer
+from qpsafe.ranging.reduction.candidates_kernel import WIDTH, choose, place_all, renew
+from qpsafe.ranging.reduction.reduce import Reducer
 from qpsafe.ranging.rules import OCCUPIED, RangeRules
 from qpsafe.ranging.sensor import WORLD, RangeImage, RangeSensor
 from qpsafe.ranging.tracking.prediction import Foresight

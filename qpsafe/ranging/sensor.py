@@ -13,7 +13,7 @@ from qpsafe.ranging.given import is_number, parts_of, rows_and_columns
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.spot import Spot
+    from qpsafe.sensing.skin.spot import Spot
 
 Array = NDArray[np.float64]
 

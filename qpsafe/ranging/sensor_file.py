@@ -11,7 +11,7 @@ from pydantic import Field
 
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.ranging.sensor import RangeSensor
-from qpsafe.sensing.spot_file import Angle, SpotFile, read_tables
+from qpsafe.sensing.skin.spot_file import Angle, SpotFile, read_tables
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.ranging.nearest_kernel import same_numbers
+from qpsafe.ranging.reduction.nearest_kernel import same_numbers
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
-    from qpsafe.ranging.reduce import Shown
+    from qpsafe.ranging.reduction.reduce import Shown
     from qpsafe.ranging.rules import RangeRules
     from qpsafe.ranging.sensor import RangeSensor
     from qpsafe.sensing.rules import SensingRules

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from qpsafe.errors import RobotFileError, RobotWarning
-from qpsafe.robot.defaults import spec_from_model
 from qpsafe.robot.dh import dh_frames
-from qpsafe.robot.model_file import ModelFile, read_bundled, read_model
-from qpsafe.robot.package_model import find_package_model, is_package_model
+from qpsafe.robot.models.model_file import ModelFile, read_bundled, read_model
+from qpsafe.robot.models.package_model import find_package_model, is_package_model
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.schema import RobotFile, read_robot_file, table_key
-from qpsafe.robot.spec import DHChain, Region, RobotSpec, Tool, Tuned
+from qpsafe.robot.robot_file.defaults import spec_from_model
+from qpsafe.robot.robot_file.schema import RobotFile, read_robot_file, table_key
+from qpsafe.robot.robot_file.spec import DHChain, Region, RobotSpec, Tool, Tuned
 
 _TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.robot.kinematics import tree_of
-from qpsafe.robot.mjcf import ENDLESS
-from qpsafe.robot.spec import HeldJoint, Region, RobotSpec, Tool, Tuned
+from qpsafe.robot.models.mjcf import ENDLESS
+from qpsafe.robot.robot_file.spec import HeldJoint, Region, RobotSpec, Tool, Tuned
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
 from qpsafe.text.words import counted

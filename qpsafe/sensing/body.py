@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from qpsafe.robot.hulls import BodyHull
+from qpsafe.robot.models.hulls import BodyHull
 from qpsafe.sensing.hulls import HullSet, Obstacle
 
 if TYPE_CHECKING:

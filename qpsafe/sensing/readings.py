@@ -9,11 +9,12 @@ from qpsafe.compiled.compiled import Array, add, entry, readable
 from qpsafe.compiled.memory import view
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
-from qpsafe.sensing import health, hold, hulls, spots, velocity
+from qpsafe.sensing import health, hold, hulls, velocity
 from qpsafe.sensing.health import HEALTHY, judge
 from qpsafe.sensing.hold import believe
 from qpsafe.sensing.hulls import within
-from qpsafe.sensing.spots import ray_of
+from qpsafe.sensing.skin import spots
+from qpsafe.sensing.skin.spots import ray_of
 from qpsafe.sensing.velocity import approach
 
 _floats, _rows = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 2, "C", readonly=True)

@@ -17,7 +17,7 @@ from qpsafe.sensing.hold import PointHold
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.readings import take_readings
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spots import SpotArray
+from qpsafe.sensing.skin.spots import SpotArray
 from qpsafe.sensing.velocity import ApproachVelocity
 from qpsafe.text.words import counted
 

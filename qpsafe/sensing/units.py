@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 
 from qpsafe.compiled.compiled import Array, entry, inline, readable
-from qpsafe.sensing.spots import SpotArray
+from qpsafe.sensing.skin.spots import SpotArray
 
 #: Readings [m], and points from the world's origin [m], that nothing of their kind tells.
 FARTHEST_READING, FARTHEST_POINT = 10.0, 100.0

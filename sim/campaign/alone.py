@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ from qpsafe.errors import ConfigurationError
 
 try:
     import fcntl
-except ImportError:  # Windows: nobody is kept out
+except ImportError:  # Windows: nobody is kept out, which is said
     fcntl = None  # type: ignore[assignment]
 
 
@@ -22,13 +23,20 @@ def alone_in(folder: Path | None) -> Iterator[None]:
     Args:
         folder: Made if it is not there; None for none.
 
+    Warns:
+        UserWarning: It cannot be locked here: nobody is kept out.
+
     Raises:
         ConfigurationError: Somebody else is at work there.
     """
-    if folder is None or fcntl is None:
+    if folder is None:
         yield
         return
     folder.mkdir(parents=True, exist_ok=True)
+    if fcntl is None:
+        _say_unguarded(folder)
+        yield
+        return
     handle = os.open(folder, os.O_RDONLY)
     try:
         try:
@@ -37,7 +45,12 @@ def alone_in(folder: Path | None) -> Iterator[None]:
             expected = "a folder in which nobody else is at work: wait for that, or take another folder"
             raise ConfigurationError(folder, "folder", "in use by another process", expected) from None
         except OSError:  # a file system without locks
-            pass
+            _say_unguarded(folder)
         yield
     finally:
         os.close(handle)  # also ends the lock
+
+
+def _say_unguarded(folder: Path) -> None:
+    words = f"{folder} cannot be locked here: make sure that no other process is at work in it"
+    warnings.warn(words, UserWarning, stacklevel=4)

@@ -25,7 +25,7 @@ import qpsafe.sim
 import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
-from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.ranging.sets import sensor_kinds
 from qpsafe.text.json_text import json_text
 from qpsafe.text.toml_text import TomlText

@@ -21,8 +21,8 @@ from qpsafe.extras import require
 from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import Columns, columns_of, joined
 from qpsafe.sim.campaign.store import Played, Store, read, stored_plan, stored_versions, versions
+from qpsafe.sim.campaign.trials.rows import Columns, columns_of, joined
 
 #: Plays a trial: plan, number -> a row a controller. Deterministic, and possible to pickle.
 TrialFunction = Callable[[Plan, int], Sequence[dict[str, Any]]]
@@ -96,7 +96,7 @@ def run_campaign(
         executor: Any of `concurrent.futures`, or Dask's; None for processes of our own.
         progress: Called with the trials that are finished, and how many there are.
         workers: Processes, if there is no executor; 1 for none but this one.
-        trial: Plays one trial; by default `qpsafe.sim.campaign.trial.run_trial`.
+        trial: Plays one trial; by default `qpsafe.sim.campaign.trials.trial.run_trial`.
         notice: Told in words when a process has died.
         keep_every: Time after which finished trials are written to the folder [s].
 
@@ -195,6 +195,6 @@ def _pieces(trials: int, finished: set[int]) -> Iterator[Trials]:
 
 
 def _engine() -> TrialFunction:
-    from qpsafe.sim.campaign.trial import run_trial  # type: ignore[import-not-found,unused-ignore]
+    from qpsafe.sim.campaign.trials.trial import run_trial  # type: ignore[import-not-found,unused-ignore]
 
     return run_trial

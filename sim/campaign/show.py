@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import MissingExtraError
 from qpsafe.reference import JointReference
-from qpsafe.sim.campaign.closest import closest
-from qpsafe.sim.campaign.contact import part_name
-from qpsafe.sim.campaign.measures import measures
-from qpsafe.sim.campaign.meeting import meeting
-from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.campaign.trial import recorded
+from qpsafe.sim.campaign.trials.closest import closest
+from qpsafe.sim.campaign.trials.contact import part_name
+from qpsafe.sim.campaign.trials.measures import measures
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.servo import DT
+from qpsafe.sim.campaign.trials.trial import recorded
 from qpsafe.sim.drawing.film import Film
 from qpsafe.sim.world.scene import CAMERA, Scene, build_scene
 from qpsafe.text.words import file_word
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.meeting import Case, Meeting
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.recording import Recording
+    from qpsafe.sim.campaign.trials.meeting import Case, Meeting
+    from qpsafe.sim.campaign.trials.recording import Recording
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from qpsafe.sim.campaign.closest import closest
-from qpsafe.sim.campaign.in_mujoco import reference
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.campaign.trial import recorded
+from qpsafe.sim.campaign.trials.closest import closest
+from qpsafe.sim.campaign.trials.in_mujoco import reference
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.servo import DT
+from qpsafe.sim.campaign.trials.trial import recorded
 
 LOOP = 250  # ticks of the MuJoCo loop in a block
 

@@ -21,7 +21,7 @@ import numpy as np
 from qpsafe.errors import ConfigurationError
 from qpsafe.extras import require
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import COLUMNS, DTYPES, NAMES, Columns, joined
+from qpsafe.sim.campaign.trials.rows import COLUMNS, DTYPES, NAMES, Columns, joined
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from qpsafe.tick import Tick
 
 if TYPE_CHECKING:
     from qpsafe.danger.activation import Activation
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
 
 
 class ViewerUnavailableError(QpsafeError, RuntimeError):

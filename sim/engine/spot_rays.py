@@ -20,8 +20,8 @@ from qpsafe.geometry import layout
 from qpsafe.geometry.layout import BALL, BODY, CASE, KIND, MESH, NODES, NODES_FROM, PLANE, SCENE_BODY, SEEN, SIZE
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, place
-from qpsafe.sensing import spots
-from qpsafe.sensing.spots import ray_of
+from qpsafe.sensing.skin import spots
+from qpsafe.sensing.skin.spots import ray_of
 from qpsafe.sim.engine import ray_mesh, ray_shapes
 from qpsafe.sim.engine.ray_mesh import cone_mesh
 from qpsafe.sim.engine.ray_shapes import ray_box, ray_capsule, ray_primitive

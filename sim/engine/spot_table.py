@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.robot.names import name_in_file
+from qpsafe.robot.models.names import name_in_file
 
 if TYPE_CHECKING:
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
     from qpsafe.sim.world.scene import Scene
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from qpsafe.placement.peak import peak_field
 from qpsafe.placement.sample import NEAR, Detections
 from qpsafe.placement.sight import zone_rays
 from qpsafe.robot.loader import load_quietly
-from qpsafe.sensing.spots import SpotArray, rays_in_world
+from qpsafe.sensing.skin.spots import SpotArray, rays_in_world
 from qpsafe.sim.placement.draw import draw_pairs
 from qpsafe.sim.placement.dummy import RADII
 from qpsafe.sim.placement.world import PlacementWorld

@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.models.mjcf import held_positions
 from qpsafe.sim.drawing.gl import make_context
 from qpsafe.sim.world.robot_spec import robot_spec, shown_groups
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
 
 NODE, SPOT = (0.10, 0.35, 0.85, 1.0), (0.05, 0.55, 0.25, 1.0)
 SIZE = (560, 640)  # of a view [px]

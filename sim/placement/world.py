@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import RobotFileError
-from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.models.mjcf import held_positions
 from qpsafe.sim.people.anatomy import SEGMENTS
 from qpsafe.sim.people.limbs import axis_quaternions
 from qpsafe.sim.world.robot_spec import ROBOT_COLLISION, robot_spec
@@ -21,7 +21,7 @@ from qpsafe.sim.world.surroundings import SCENERY, add_surroundings
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.ranging.sensor_file import load_range_sensors
-from qpsafe.sensing.spots import SpotArray, load_spots
+from qpsafe.sensing.skin.spots import SpotArray, load_spots
 from qpsafe.sim.world.sensor import SENSORS
 
 if TYPE_CHECKING:

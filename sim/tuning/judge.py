@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.report.measures import SHARES
 from qpsafe.sim.campaign.report.statistics import MEAN, Bootstrap, Estimate, McNemar, mcnemar
-from qpsafe.sim.campaign.rows import Columns
 from qpsafe.sim.campaign.runner import run_campaign
+from qpsafe.sim.campaign.trials.rows import Columns
 from qpsafe.sim.tuning.objectives import harm
 from qpsafe.sim.tuning.search import JUDGE
 

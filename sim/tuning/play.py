@@ -7,18 +7,18 @@ from dataclasses import replace
 from time import process_time
 from typing import TYPE_CHECKING, NamedTuple
 
-from qpsafe.sim.campaign.measures import measures
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.opponents.registry import Opponent
-from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.campaign.trial import recorded_by
+from qpsafe.sim.campaign.trials.measures import measures
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.servo import DT
+from qpsafe.sim.campaign.trials.trial import recorded_by
 from qpsafe.sim.tuning.objectives import Outcome
 from qpsafe.sim.tuning.values import Values
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.opponents.registry import Controls
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
 
 #: Names of the controllers that are made of values begin with it.
 PREFIX = "values "

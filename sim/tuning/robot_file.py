@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_quietly
-from qpsafe.robot.schema import Units
+from qpsafe.robot.robot_file.schema import Units
 from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.tuning.values import Values, present
 

@@ -11,7 +11,7 @@ from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.campaign.trials.servo import DT
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot

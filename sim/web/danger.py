@@ -12,7 +12,7 @@ from qpsafe.sim.drawing.overlay import DangerOverlay, danger_colour
 from qpsafe.sim.engine.world import owners_of
 
 if TYPE_CHECKING:
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
     from qpsafe.sim.web.bodies import Bodies
     from qpsafe.sim.world.scene import Scene
     from qpsafe.tick import Tick

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.irc5.latency import Latency
+from qpsafe.irc5.process.latency import Latency
 from qpsafe.sim.web.frame import Every, Row
 
 if TYPE_CHECKING:

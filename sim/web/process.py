@@ -15,7 +15,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from qpsafe.irc5 import realtime
+from qpsafe.irc5.process import realtime
 from qpsafe.sim.web.channel import Inbound, Outbound, one_way
 from qpsafe.sim.web.frame import Every
 from qpsafe.sim.web.live import Live

@@ -17,7 +17,7 @@ from qpsafe.laws.by_name import law_named
 from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sim.campaign.people.model import EncounterModel
-from qpsafe.sim.campaign.station import LINE, Station
+from qpsafe.sim.campaign.trials.station import LINE, Station
 from qpsafe.sim.experiments.fast_person import at_speed
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.stage import robot_stage

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.danger.thresholds import robot_activation
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.sim.drawing.film import medium_and_high
 from qpsafe.sim.web.bodies import Bodies
 from qpsafe.sim.web.danger import Danger

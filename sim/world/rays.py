@@ -22,7 +22,7 @@ from qpsafe.sim.world.scene import PERSON, ROBOT_COLLISION, SCENERY, Scene
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.robot.mjcf import held_positions
-from qpsafe.robot.mujoco_spec import mujoco_spec
+from qpsafe.robot.models.mjcf import held_positions
+from qpsafe.robot.models.mujoco_spec import mujoco_spec
 from qpsafe.sim.world.tool_axis import tool_axis, turned_to
 
 if TYPE_CHECKING:

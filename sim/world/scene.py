@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.mjcf import held_positions
+from qpsafe.robot.models.mjcf import held_positions
 from qpsafe.sim.people.anatomy import CARDBOARD
 from qpsafe.sim.people.person import Board, Person, PersonPose
 from qpsafe.sim.world.robot_spec import ROBOT_COLLISION, ROBOT_VISUAL, robot_spec

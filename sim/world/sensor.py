@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sensing.sharp import SharpConverter
+from qpsafe.sensing.skin.sharp import SharpConverter
 from qpsafe.sim.engine.tracks import people_of
 from qpsafe.sim.world.rays import SpotRays
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
-    from qpsafe.sensing.spots import SpotArray
+    from qpsafe.sensing.skin.spots import SpotArray
     from qpsafe.sim.world.scene import Scene
 
 SENSORS = ("ideal", "sharp", "perfect")

@@ -195,7 +195,7 @@ def test_a_model_that_is_not_mujoco_s_is_found(
     tmp_path: Path, mjcf_writer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The comparison on loading is no formality: any body, site, range or inertia that is elsewhere is named."""
-    from qpsafe.robot import mjcf_build
+    from qpsafe.robot.models import mjcf_build
 
     path, real = mjcf_writer(tmp_path, "root_pose", 0).write(), mjcf_build.build_model
 

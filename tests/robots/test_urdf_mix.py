@@ -15,7 +15,7 @@ from amounts import first
 from qpsafe.errors import RobotFileError
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.starting_file import starting_robot_toml
+from qpsafe.robot.robot_file.starting_file import starting_robot_toml
 from qpsafe.sensing.body import body_hulls
 
 SEEDS = 100

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.robot.mujoco_spec import mujoco_model, weighed_model
+from qpsafe.robot.models.mujoco_spec import mujoco_model, weighed_model
 from qpsafe.robot.robot import Robot
 
 RODS = (
@@ -77,7 +77,7 @@ def test_a_robot_whose_file_states_all_keeps_its_own_model(name: str) -> None:
 
 
 def test_a_blow_of_an_arm_without_masses_has_a_finite_energy(tmp_path: Path) -> None:
-    from qpsafe.sim.campaign.harm import effective_mass
+    from qpsafe.sim.campaign.trials.harm import effective_mass
 
     robot = arm(tmp_path, [0.0] * 6, [True] * 6)
     q = 0.3 * np.ones(6)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import qpsafe
-from qpsafe.robot.mjcf import ENDLESS
+from qpsafe.robot.models.mjcf import ENDLESS
 from qpsafe.robot.robot import Robot
 from qpsafe.tasks.program_file import load_program
 from qpsafe.tasks.trajectory import FixedJoints, JointSample

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import qpsafe
-from qpsafe.cli.stream import _controller
+from qpsafe.cli.irc5.stream import _controller
 from qpsafe.tasks.program_file import ProgramError, load_program
 from qpsafe.text.lines import line_of
 

@@ -34,7 +34,7 @@ def plan_for_its_robot(where: str, plan: Plan, named: bool) -> Plan:
             or ready.folder.resolve() != find_robot(plan.robot).parent.resolve()
         ):
             plan = replace(plan, robot=str(ready.folder))  # one was made for it
-    from qpsafe.sim.campaign.station import station
+    from qpsafe.sim.campaign.trials.station import station
 
     able = []
     for motion in plan.motions:

@@ -73,7 +73,7 @@ OF_CONTACT = ("contact_class", "contact_region", "contact_frame", "moving", "tow
 def _show_row(row: dict[str, Any], screen: Console) -> None:
     """What came of the trial: what applies to it."""
     from qpsafe.cli.sheet import Sheet
-    from qpsafe.sim.campaign.rows import COLUMNS
+    from qpsafe.sim.campaign.trials.rows import COLUMNS
 
     sheet = Sheet("What came of it", ("", "value", "unit"), text=(0, 2))
     for column in COLUMNS:

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from qpsafe.errors import ConfigurationError, QpsafeError
-from qpsafe.irc5.outlet import Outlet
+from qpsafe.irc5.process.outlet import Outlet
 from qpsafe.irc5.records.formats import BinaryFormat, CsvFormat, ReferenceFormat
 from qpsafe.reference import JointReference
 

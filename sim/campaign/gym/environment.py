@@ -15,12 +15,12 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.extras import require
 from qpsafe.limits import JointLimits
 from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
-from qpsafe.sim.campaign.measures import measures
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.recording import STATUSES, Recording
-from qpsafe.sim.campaign.senses import Senses
-from qpsafe.sim.campaign.servo import DT, Servo
+from qpsafe.sim.campaign.trials.measures import measures
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.recording import STATUSES, Recording
+from qpsafe.sim.campaign.trials.senses import Senses
+from qpsafe.sim.campaign.trials.servo import DT, Servo
 from qpsafe.tasks.rotation import log3
 from qpsafe.tick import BAD_INPUT, OK
 
@@ -30,8 +30,8 @@ from gymnasium.spaces import Box, Dict  # noqa: E402
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
-    from qpsafe.sim.campaign.meeting import Meeting
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.meeting import Meeting
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]
@@ -173,7 +173,7 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         return observation, reward, terminated, truncated, info
 
     def measures(self, name: str = "policy") -> dict[str, Any]:
-        """The row of the encounter up to now, see `qpsafe.sim.campaign.rows`.
+        """The row of the encounter up to now, see `qpsafe.sim.campaign.trials.rows`.
 
         Args:
             name: In the column ``controller``; a campaign's controller also gives the column ``sensor``.

@@ -14,7 +14,7 @@ from qpsafe.sim.campaign.opponents.registry import NOTHING, POINTS, opponent
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.opponents.registry import Controls
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from qpsafe.geometry.layout import BODY
 from qpsafe.limits import JointLimits
-from qpsafe.sim.campaign.closest import PairsAlong
 from qpsafe.sim.campaign.limit.people_along import PeopleAlong
 from qpsafe.sim.campaign.limit.rollout import roll_out
-from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.campaign.trials.closest import PairsAlong
+from qpsafe.sim.campaign.trials.servo import DT
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.recording import Recording
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.recording import Recording
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.sim.engine.tracks import PersonTracks
 
 Array = NDArray[np.float64]

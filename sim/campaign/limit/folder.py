@@ -17,9 +17,9 @@ from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.limit.row import Limit, limit_from
 from qpsafe.sim.campaign.limit.search import EVALUATIONS
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, stored_results
 from qpsafe.sim.campaign.store import Store
+from qpsafe.sim.campaign.trials.rows import of_controller
 from qpsafe.text.json_text import json_text
 from qpsafe.text.words import file_word
 

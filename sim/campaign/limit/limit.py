@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from qpsafe.sim.campaign.limit.escape import Escape
 from qpsafe.sim.campaign.limit.row import Limit
 from qpsafe.sim.campaign.limit.search import EVALUATIONS, best_way
-from qpsafe.sim.campaign.meeting import meeting
-from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.campaign.sight import first_seen
-from qpsafe.sim.campaign.trial import recorded
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.servo import DT
+from qpsafe.sim.campaign.trials.sight import first_seen
+from qpsafe.sim.campaign.trials.trial import recorded
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.meeting import Case, Meeting
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.recording import Recording
+    from qpsafe.sim.campaign.trials.meeting import Case, Meeting
+    from qpsafe.sim.campaign.trials.recording import Recording
 
 Array = NDArray[np.float64]
 

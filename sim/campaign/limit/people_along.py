@@ -15,12 +15,12 @@ from qpsafe.compiled.memory import view
 from qpsafe.geometry.separation import hull_types
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward
-from qpsafe.sim.campaign.closest import ways_of
+from qpsafe.sim.campaign.trials.closest import ways_of
 from qpsafe.sim.engine import nearest
 from qpsafe.sim.engine.nearest import PAIR, robot_to_people
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.sim.engine.tracks import PersonTracks
 
 Array = NDArray[np.float64]

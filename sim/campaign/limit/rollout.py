@@ -14,8 +14,8 @@ from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import entry
 from qpsafe.compiled.memory import view
 from qpsafe.limits import box_into, stopping_speed
-from qpsafe.sim.campaign import servo
-from qpsafe.sim.campaign.servo import DT, served
+from qpsafe.sim.campaign.trials import servo
+from qpsafe.sim.campaign.trials.servo import DT, served
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.campaign.worst.strategy import strategy
 
 if TYPE_CHECKING:

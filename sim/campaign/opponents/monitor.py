@@ -13,7 +13,7 @@ from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.engine.bodies import Bodies
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
 
 Array = NDArray[np.float64]
 

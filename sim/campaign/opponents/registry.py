@@ -31,7 +31,7 @@ from qpsafe.sim.campaign.opponents.stop import StopOnly
 
 if TYPE_CHECKING:
     from qpsafe.controller import SafetyController
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.tick import Tick
 
 PERFECT = "_perfect_sight"

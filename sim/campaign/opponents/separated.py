@@ -14,7 +14,7 @@ from qpsafe.recovery.recovery import FOLLOWING, SUSPENDED
 from qpsafe.sim.campaign.opponents.scaling import Clocked
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 
 if TYPE_CHECKING:
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.tick import Tick
 
 Array = NDArray[np.float64]

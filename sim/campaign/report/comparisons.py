@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
 from qpsafe.sim.campaign.report.statistics import MEAN, RESAMPLES, Array, Bootstrap, Estimate, Statistic, holm, mcnemar
-from qpsafe.sim.campaign.rows import Columns
+from qpsafe.sim.campaign.trials.rows import Columns
 
 #: Whom the others are compared with: what cells do today, and what qpsafe does by itself.
 REFERENCES = ("stop", "default")

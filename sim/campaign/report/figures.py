@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.campaign.rows import CLASSES, Columns
+from qpsafe.sim.campaign.trials.rows import CLASSES, Columns
 from qpsafe.sim.drawing.plots import STYLE, plain
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 
 from qpsafe.sim.campaign.report.measures import SHARES
 from qpsafe.sim.campaign.report.statistics import holm, mcnemar
-from qpsafe.sim.campaign.rows import Columns
+from qpsafe.sim.campaign.trials.rows import Columns
 from qpsafe.text.words import counted
 
 #: Whom nobody may be worse than.

@@ -20,7 +20,7 @@ from typing import Any
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.report.limits import MEASURES as LIMITS
 from qpsafe.sim.campaign.report.measures import FIGURES, MEASURES, SHARES
-from qpsafe.sim.campaign.rows import COLUMNS
+from qpsafe.sim.campaign.trials.rows import COLUMNS
 
 _TABLE = re.compile(r"<!-- campaign: (?!end)(.*?) -->\n.*?<!-- campaign: end -->", re.DOTALL)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.report.statistics import MEAN, MEDIAN, Array, Statistic
-from qpsafe.sim.campaign.rows import Columns
+from qpsafe.sim.campaign.trials.rows import Columns
 
 
 class ShareMeasure(NamedTuple):

@@ -11,8 +11,8 @@ from qpsafe.sim.campaign.report.figures import distance_figure, energy_figure, h
 from qpsafe.sim.campaign.report.html import Html, element, joined, page, table
 from qpsafe.sim.campaign.report.limits import limits_section
 from qpsafe.sim.campaign.report.measures import FIGURES, MEASURES, SHARES, FigureMeasure, ShareMeasure, percent
-from qpsafe.sim.campaign.rows import COLUMNS, of_controller
 from qpsafe.sim.campaign.runner import Results
+from qpsafe.sim.campaign.trials.rows import COLUMNS, of_controller
 from qpsafe.text.words import counted
 
 LEVEL = 0.05

@@ -16,8 +16,8 @@ from qpsafe.sim.campaign.report.findings import findings
 from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
 from qpsafe.sim.campaign.report.statistics import CONFIDENCE, Share, share
-from qpsafe.sim.campaign.rows import CLASSES, Columns, of_controller
 from qpsafe.sim.campaign.runner import Results
+from qpsafe.sim.campaign.trials.rows import CLASSES, Columns, of_controller
 
 WORST = 10
 

@@ -54,7 +54,7 @@ def find_worst(
         executor: Any of `concurrent.futures`, or Dask's; None for processes of our own.
         progress: Called with the trials that are done, and how many there are.
         workers: Processes, if there is no executor; 1 for none but this one.
-        case: Plays an encounter; by default `qpsafe.sim.campaign.trial.run_case`.
+        case: Plays an encounter; by default `qpsafe.sim.campaign.trials.trial.run_case`.
         continuous: Coordinates of the people's model in which an encounter is continuous, (d,); by default the model's.
 
     Raises:
@@ -144,6 +144,6 @@ def _continuous(plan: Plan) -> NDArray[np.bool_]:
 
 
 def _engine() -> CaseFunction:
-    from qpsafe.sim.campaign.trial import run_case  # type: ignore[import-not-found,unused-ignore]
+    from qpsafe.sim.campaign.trials.trial import run_case  # type: ignore[import-not-found,unused-ignore]
 
     return run_case

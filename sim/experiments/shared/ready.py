@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.defaults import HOMELESS
 from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
-from qpsafe.robot.starting_file import starting_robot_toml
+from qpsafe.robot.robot_file.defaults import HOMELESS
+from qpsafe.robot.robot_file.starting_file import starting_robot_toml
 from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.experiments.shared.home import Arm, chosen_home
 from qpsafe.sim.experiments.shared.skin import skin_toml

@@ -18,8 +18,8 @@ from qpsafe.placement.sensors import Sensor
 from qpsafe.placement.sight import SelfSight
 from qpsafe.placement.spots_toml import spots_toml
 from qpsafe.sensing.body import body_hulls
-from qpsafe.sensing.spot import Spot
-from qpsafe.sensing.spots import SpotArray
+from qpsafe.sensing.skin.spot import Spot
+from qpsafe.sensing.skin.spots import SpotArray
 from qpsafe.sim.experiments.shared.home import Arm
 from qpsafe.sim.placement.run import MonteCarlo
 from qpsafe.text.json_text import json_text

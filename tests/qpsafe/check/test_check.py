@@ -13,7 +13,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.geometry.solids import Solids
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sim.campaign import plan
+from qpsafe.sim.campaign.trials import station
 from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 from qpsafe.sim.world.known import known_obstacles
@@ -57,7 +57,7 @@ def test_bundled_programs_can_be_run_as_they_are_planned():
         result = check_path(ROBOT, experiment.reference, known=known_obstacles(experiment.scene))
         assert wrong(result) == [], words(result)
         assert result.furniture is not None
-    result = check_path(ROBOT, load_program(plan.__file__.replace("plan.py", "line.toml"), ROBOT))
+    result = check_path(ROBOT, load_program(station.__file__.replace("station.py", "line.toml"), ROBOT))
     assert wrong(result) == []
 
 

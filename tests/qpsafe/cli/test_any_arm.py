@@ -14,7 +14,7 @@ from qpsafe.cli.demos.any_robot import own_folder
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_quietly
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 
 
 @pytest.fixture(autouse=True)

@@ -19,24 +19,12 @@ from rich.cells import cell_len
 from rich.console import Console
 
 import qpsafe.cli
-from qpsafe.cli import (
-    bench,
-    calibrate,
-    calibrate_camera,
-    check,
-    common,
-    compare,
-    irc5_faults,
-    place,
-    robots,
-    sick_sensors,
-    story,
-    stream_report,
-    tune,
-)
+from qpsafe.cli import bench, check, common, compare, robots, story, tune
 from qpsafe.cli.campaign import limit, single
 from qpsafe.cli.campaign import run as campaign
 from qpsafe.cli.demos import all_robots, fast_person, fixed, path, pick_and_place
+from qpsafe.cli.irc5 import irc5_faults, stream_report
+from qpsafe.cli.sensors import calibrate, calibrate_camera, place, sick_sensors
 from qpsafe.cli.sheet import Sheet
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.campaign.limit.row import Limit
@@ -71,8 +59,8 @@ def of_compilation(screen: Console, folder: Path) -> None:
 
 
 def of_calibration(screen: Console, folder: Path) -> None:
-    from qpsafe.sensing.calibration import Fit
-    from qpsafe.sensing.sharp import SharpCurve
+    from qpsafe.sensing.skin.calibration import Fit
+    from qpsafe.sensing.skin.sharp import SharpCurve
 
     curve, distances = SharpCurve(), np.linspace(0.2, 0.8, 120)
     fits = [Fit(f"{name} {HOSTILE}", curve, distances, curve.voltage(distances + 0.1), 117) for name in "ab"]

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.irc5.latency import RESOLUTION, Latency
+from qpsafe.irc5.process.latency import RESOLUTION, Latency
 
 TIMES = st.lists(st.floats(0.0, 0.3), min_size=1, max_size=200)
 

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.irc5 import outlet as module
-from qpsafe.irc5.outlet import Outlet
+from qpsafe.irc5.process import outlet as module
+from qpsafe.irc5.process.outlet import Outlet
 
 
 class Gate:

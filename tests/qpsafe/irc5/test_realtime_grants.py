@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from qpsafe.irc5 import realtime
+from qpsafe.irc5.process import realtime
 
 
 def fresh(code: str) -> str:
@@ -20,7 +20,7 @@ def fresh(code: str) -> str:
 def test_every_answer_is_one_line_and_matches_the_system() -> None:
     code = (
         "import os\n"
-        "from qpsafe.irc5.realtime import fifo, lock_memory\n"
+        "from qpsafe.irc5.process.realtime import fifo, lock_memory\n"
         "a, b = fifo(7), lock_memory()\n"
         "print(a.granted == (os.sched_getscheduler(0) == os.SCHED_FIFO), b.granted, sep='\\n')\n"
         "print(a.line, b.line, sep='\\n')\n"
@@ -43,7 +43,7 @@ def test_an_impossible_priority_is_refused_in_words() -> None:
 def test_one_thread_before_numpy_and_not_after() -> None:
     code = (
         "import sys\n"
-        "from qpsafe.irc5.realtime import one_thread\n"
+        "from qpsafe.irc5.process.realtime import one_thread\n"
         "print(one_thread().granted)\n"
         "import numpy, numba\n"
         "print(numba.config.NUMBA_NUM_THREADS)\n"
@@ -57,7 +57,7 @@ def test_one_thread_before_numpy_and_not_after() -> None:
 def test_what_is_alive_is_frozen() -> None:
     code = (
         "import gc\n"
-        "from qpsafe.irc5.realtime import freeze_garbage\n"
+        "from qpsafe.irc5.process.realtime import freeze_garbage\n"
         "grant = freeze_garbage()\n"
         "print(gc.get_freeze_count() > 1000, gc.isenabled(), grant.granted)"
     )
@@ -69,7 +69,7 @@ def test_what_is_alive_is_frozen() -> None:
 def test_sleeps_end_when_they_should() -> None:
     code = (
         "import ctypes\n"
-        "from qpsafe.irc5.realtime import fine_timers\n"
+        "from qpsafe.irc5.process.realtime import fine_timers\n"
         "fine_timers()\n"
         "print(ctypes.CDLL(None).prctl(30, 0, 0, 0, 0))"  # PR_GET_TIMERSLACK [ns]
     )

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
-from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.packets.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.records.log import read_references
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.experiments.by_name import experiment_loop
@@ -356,7 +356,7 @@ def test_a_simulated_robot_that_nobody_answers_says_so() -> None:
 
 
 def test_a_program_moves_the_frame_that_it_names(tmp_path: Path) -> None:
-    from qpsafe.cli.stream import _controller
+    from qpsafe.cli.irc5.stream import _controller
 
     text = PROGRAM_FILE.read_text(encoding="utf-8").replace('"tcp"', '"flange"')
     path = tmp_path / "flange.toml"

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.watchdog import Watchdog
+from qpsafe.irc5.process.watchdog import Watchdog
 
 
 def until(condition, seconds: float = 30.0) -> bool:
@@ -39,7 +39,7 @@ def test_it_asks_once_the_heartbeat_stops_and_not_before_the_first() -> None:
 def test_it_kills_a_loop_that_hangs() -> None:
     code = (
         "import time\n"
-        "from qpsafe.irc5.watchdog import Watchdog\n"
+        "from qpsafe.irc5.process.watchdog import Watchdog\n"
         "with Watchdog(limit=0.05, grace=0.2) as watchdog:\n"
         "    watchdog.beat()\n"
         "    time.sleep(120)\n"
@@ -51,7 +51,7 @@ def test_it_kills_a_loop_that_hangs() -> None:
 
 def test_it_ends_with_the_loop() -> None:
     code = (
-        "from qpsafe.irc5.watchdog import Watchdog\n"
+        "from qpsafe.irc5.process.watchdog import Watchdog\n"
         "import os\n"
         "watchdog = Watchdog(limit=0.05, grace=3000.0).__enter__()\n"
         "print(watchdog._process.pid, flush=True)\n"
@@ -130,7 +130,7 @@ def test_it_kills_a_loop_that_hangs_though_nobody_reads_what_it_says() -> None:
     """With a full pipe for its words: to speak first, it would have waited for ever."""
     code = (
         "import os, time\n"
-        "from qpsafe.irc5.watchdog import Watchdog\n"
+        "from qpsafe.irc5.process.watchdog import Watchdog\n"
         "with Watchdog(limit=0.05, grace=0.2) as watchdog:\n"
         "    os.set_blocking(2, False)\n"
         "    try:\n"

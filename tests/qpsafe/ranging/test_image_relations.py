@@ -16,7 +16,7 @@ from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.sensing.spot_file import read_spots
+from qpsafe.sensing.skin.spot_file import read_spots
 from qpsafe.tick import Tick
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -20,7 +20,7 @@ from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.ranging.adapters.depth_camera import DepthCamera
 from qpsafe.ranging.adapters.laser_scan import LaserScanner
 from qpsafe.ranging.adapters.vl53l5cx import Vl53l5cx, vl53l5cx
-from qpsafe.ranging.reduce import tiled
+from qpsafe.ranging.reduction.reduce import tiled
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeSensor
 

@@ -11,9 +11,9 @@ import pytest
 
 import qpsafe
 from qpsafe.ranging.sensor_file import range_sensor_files, read_range_sensors
-from qpsafe.robot.hulls import solid_geoms
-from qpsafe.robot.mjcf import held_positions
-from qpsafe.robot.mujoco_spec import mujoco_model
+from qpsafe.robot.models.hulls import solid_geoms
+from qpsafe.robot.models.mjcf import held_positions
+from qpsafe.robot.models.mujoco_spec import mujoco_model
 
 HEADER = {
     "sensor": '"Any"',

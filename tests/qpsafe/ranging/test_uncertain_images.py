@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qpsafe.ranging.adapters.depth_camera import DepthCamera
-from qpsafe.ranging.reduce_kernel import tile, tile_sigma
+from qpsafe.ranging.reduction.reduce_kernel import tile, tile_sigma
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.tick import Tick

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpsafe.ranging.judge import Usable
-from qpsafe.ranging.looking_kernel import COSINE, SINE
-from qpsafe.ranging.reduce import Reducer, view_of
+from qpsafe.ranging.reduction.looking_kernel import COSINE, SINE
+from qpsafe.ranging.reduction.reduce import Reducer, view_of
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.sensing.body import surrounding_hulls

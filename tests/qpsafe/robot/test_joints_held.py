@@ -16,7 +16,7 @@ from qpsafe.robot.dh import dh_frames
 from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint, choose_joints
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.starting_file import starting_robot_toml
+from qpsafe.robot.robot_file.starting_file import starting_robot_toml
 
 FILE = Path("some.urdf")
 URDF = """<robot name="kit">

@@ -168,7 +168,7 @@ def test_a_toml_elsewhere_describes_a_model_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", bundled_robots())
 def test_a_starting_toml_loads_as_the_bare_robot(name: str, tmp_path: Path) -> None:
     """What `qpsafe robots add` writes says what was loaded: limits, frames, wire, home."""
-    from qpsafe.robot.starting_file import starting_robot_toml
+    from qpsafe.robot.robot_file.starting_file import starting_robot_toml
 
     bare = load_robot(load_robot(name).model_path)
     (tmp_path / "robot.toml").write_text(starting_robot_toml(bare, tmp_path), encoding="utf-8")

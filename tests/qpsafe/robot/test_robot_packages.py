@@ -103,7 +103,7 @@ def test_what_cannot_be_fetched_says_why(monkeypatch: pytest.MonkeyPatch) -> Non
         raise OSError("no network")
 
     fake = types.SimpleNamespace(import_module=fail, util=importlib.util)
-    monkeypatch.setattr("qpsafe.robot.package_model.importlib", fake)
+    monkeypatch.setattr("qpsafe.robot.models.package_model.importlib", fake)
     with pytest.raises(RobotFileError, match="no network"):
         load_robot("robot_descriptions:far_description")
 

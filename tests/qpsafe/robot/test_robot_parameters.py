@@ -126,7 +126,7 @@ def test_what_is_wrong_is_named(tmp_path: Path, tables: str, named: str) -> None
 
 def test_what_reproduces_the_source_uses_its_thresholds(folder: Path) -> None:
     from qpsafe.sim.campaign.opponents import opponent
-    from qpsafe.sim.campaign.station import Station
+    from qpsafe.sim.campaign.trials.station import Station
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 
     tuned = qpsafe.load_robot(folder)

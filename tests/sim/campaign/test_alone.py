@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import signal
 import subprocess
 import sys
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign import alone
 from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.limit.folder import limits_of
 from qpsafe.sim.campaign.limit.row import Limit
@@ -95,6 +98,25 @@ def test_a_second_campaign_amid_the_first_leaves_it_as_it_would_have_been(tmp_pa
     found = run_campaign(PLAN, tmp_path, trial=trial, keep_every=0.0)
     assert refused == list(range(12))
     assert np.array_equal(found.columns["trial"], np.repeat(np.arange(12), 2))
+
+
+@pytest.mark.parametrize("lacking", ["file system", "system"])
+def test_where_nobody_can_be_kept_out_that_is_said(
+    lacking: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Disks on a network, and systems without such locks: the work is done all the same."""
+    if lacking == "system":
+        monkeypatch.setattr(alone, "fcntl", None)
+    else:
+        no_locks = types.SimpleNamespace(flock=_refuse, LOCK_EX=0, LOCK_NB=0)
+        monkeypatch.setattr(alone, "fcntl", no_locks)
+    with pytest.warns(UserWarning, match="one cannot be locked here: make sure"):
+        found = campaign(tmp_path / "one")
+    assert len(found.columns["trial"]) == 24
+
+
+def _refuse(handle: int, how: int) -> None:
+    raise OSError(errno.ENOLCK, "no locks available")
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])

@@ -10,7 +10,7 @@ import pytest
 import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.plan import Plan, parse_plan
-from qpsafe.sim.campaign.station import Station
+from qpsafe.sim.campaign.trials.station import Station
 from qpsafe.text.toml_text import TomlText
 
 CELL = """

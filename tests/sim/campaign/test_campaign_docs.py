@@ -17,8 +17,8 @@ from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.markdown import asked, filled
 from qpsafe.sim.campaign.report.measures import MEASURES
 from qpsafe.sim.campaign.report.summary import summary
-from qpsafe.sim.campaign.rows import COLUMNS
 from qpsafe.sim.campaign.runner import run_campaign
+from qpsafe.sim.campaign.trials.rows import COLUMNS
 from qpsafe.text.toml_text import TomlText
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.plan import MOTIONS, Plan, PlanFile, code_digest, load_plan, parse_plan
-from qpsafe.sim.campaign.servo import DT
+from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.text.toml_text import TomlText
 
 

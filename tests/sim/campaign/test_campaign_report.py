@@ -24,8 +24,8 @@ from qpsafe.sim.campaign.report.html import Html, element, page
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
 from qpsafe.sim.campaign.report.page import report_page, show_command
 from qpsafe.sim.campaign.report.summary import summary
-from qpsafe.sim.campaign.rows import COLUMNS, of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign
+from qpsafe.sim.campaign.trials.rows import COLUMNS, of_controller
 from qpsafe.text.json_text import json_text
 
 PLAN = Plan(trials=60, seed=5)

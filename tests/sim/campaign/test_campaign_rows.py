@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import COLUMNS, DTYPES, NAMES, RowError, columns_of, joined, of_controller
+from qpsafe.sim.campaign.trials.rows import COLUMNS, DTYPES, NAMES, RowError, columns_of, joined, of_controller
 
 PLAN = Plan(trials=6, controllers=("stop", "none", "default"))
 ROWS = [row for trial in range(6) for row in made_up_trials.run(PLAN, trial)]

@@ -16,9 +16,9 @@ import pytest
 from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.executors import WorkerDiedError, dask_executor
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import NAMES, Columns, columns_of
 from qpsafe.sim.campaign.runner import Results, TrialError, Trials, _pieces, play_trials, run_campaign, stored_results
 from qpsafe.sim.campaign.store import MANIFEST, Store, stored_plan
+from qpsafe.sim.campaign.trials.rows import NAMES, Columns, columns_of
 
 PLAN = Plan(trials=22, seed=3, controllers=("none", "stop", "default"))
 

@@ -18,11 +18,11 @@ from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.gym import environment
 from qpsafe.sim.campaign.gym.environment import ID, EncounterEnv, Observation
 from qpsafe.sim.campaign.gym.policies import ControllerPolicy, episode
-from qpsafe.sim.campaign.measures import measures
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import columns_of
-from qpsafe.sim.campaign.trial import recorded
+from qpsafe.sim.campaign.trials.measures import measures
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.rows import columns_of
+from qpsafe.sim.campaign.trials.trial import recorded
 
 HERE = Path(environment.__file__).resolve()
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.sim.campaign.contact import classified
-from qpsafe.sim.campaign.harm import REGIONS, blow, effective_mass
+from qpsafe.sim.campaign.trials.contact import classified
+from qpsafe.sim.campaign.trials.harm import REGIONS, blow, effective_mass
 from qpsafe.sim.people.anatomy import SEGMENTS
 from qpsafe.sim.world.contact_point import point_jacobian
 

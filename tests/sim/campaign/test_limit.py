@@ -13,18 +13,18 @@ from amounts import some
 import qpsafe
 from qpsafe.errors import RobotWarning
 from qpsafe.limits import JointLimits, stopping_speed
-from qpsafe.sim.campaign.closest import PairsAlong, closest, smallest
 from qpsafe.sim.campaign.limit.escape import TOUCHING, Escape
 from qpsafe.sim.campaign.limit.limit import Best, limit_of
 from qpsafe.sim.campaign.limit.people_along import PeopleAlong, steps_of
 from qpsafe.sim.campaign.limit.search import best_way
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.recording import Recording
-from qpsafe.sim.campaign.servo import DT, Servo
-from qpsafe.sim.campaign.station import station
-from qpsafe.sim.campaign.trial import recorded
-from qpsafe.sim.campaign.work import _excess
+from qpsafe.sim.campaign.trials.closest import PairsAlong, closest, smallest
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.recording import Recording
+from qpsafe.sim.campaign.trials.servo import DT, Servo
+from qpsafe.sim.campaign.trials.station import station
+from qpsafe.sim.campaign.trials.trial import recorded
+from qpsafe.sim.campaign.trials.work import _excess
 from qpsafe.sim.engine.distances import Distances
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.engine.world import World

@@ -21,8 +21,8 @@ from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.report.limits import MEASURES, limits_summary
 from qpsafe.sim.campaign.report.page import report_page
 from qpsafe.sim.campaign.report.summary import summary
-from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign, stored_results
+from qpsafe.sim.campaign.trials.rows import of_controller
 from qpsafe.text.json_text import json_text
 
 pytest.importorskip("pyarrow")

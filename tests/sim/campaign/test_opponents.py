@@ -9,14 +9,14 @@ import pytest
 from amounts import first
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.closest import closest
 from qpsafe.sim.campaign.opponents import registry
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 from qpsafe.sim.campaign.opponents.registry import names, opponent, register
-from qpsafe.sim.campaign.recording import Recording, record
-from qpsafe.sim.campaign.senses import Senses
-from qpsafe.sim.campaign.servo import DT
-from qpsafe.sim.campaign.station import station
+from qpsafe.sim.campaign.trials.closest import closest
+from qpsafe.sim.campaign.trials.recording import Recording, record
+from qpsafe.sim.campaign.trials.senses import Senses
+from qpsafe.sim.campaign.trials.servo import DT
+from qpsafe.sim.campaign.trials.station import station
 from qpsafe.sim.engine.bodies import Bodies
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.experiments.fast_person import at_speed

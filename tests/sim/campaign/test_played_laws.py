@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.opponents.registry import opponent
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.play import play
-from qpsafe.sim.campaign.recording import record
-from qpsafe.sim.campaign.senses import Senses
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.play import play
+from qpsafe.sim.campaign.trials.recording import record
+from qpsafe.sim.campaign.trials.senses import Senses
 
 
 @pytest.mark.parametrize("name", ["paper", "nullspace", "weighted"])

@@ -13,8 +13,8 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.problem import LawProblem, LawResult
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.report.summary import summary
-from qpsafe.sim.campaign.rows import of_controller
 from qpsafe.sim.campaign.runner import Results, run_campaign
+from qpsafe.sim.campaign.trials.rows import of_controller
 
 TRIALS = some(3, of=6)  # of each motion as many
 CONTROLLERS = ("none", "stop_perfect_sight", "default")

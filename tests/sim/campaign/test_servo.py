@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from qpsafe.sim.campaign.servo import DT, OMEGA, Servo
+from qpsafe.sim.campaign.trials.servo import DT, OMEGA, Servo
 
 
 def references(ticks: int) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from qpsafe.sim.campaign.meeting import meeting
 from qpsafe.sim.campaign.people import EncounterModel
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import columns_of
 from qpsafe.sim.campaign.show import show
-from qpsafe.sim.campaign.trial import recorded, run_case, run_trial
+from qpsafe.sim.campaign.trials.meeting import meeting
+from qpsafe.sim.campaign.trials.rows import columns_of
+from qpsafe.sim.campaign.trials.trial import recorded, run_case, run_trial
 from qpsafe.sim.campaign.worst.cases import Encounter
 from qpsafe.sim.drawing.gl import gl_available
 

@@ -8,8 +8,8 @@ import pytest
 from amounts import crossed
 
 import qpsafe
-from qpsafe.sim.campaign.servo import Servo
-from qpsafe.sim.campaign.work import _reversals
+from qpsafe.sim.campaign.trials.servo import Servo
+from qpsafe.sim.campaign.trials.work import _reversals
 
 POINTS = ((0.25, 0.0, 0.0), (0.15, 0.15, 0.0), (0.1, -0.2, 0.1), (0.05, 0.05, -0.25), (0.0, 0.3, 0.1))
 ROBOTS = {name: qpsafe.load_robot(name) for name in ("irb140", "iiwa14")}

@@ -16,7 +16,7 @@ from qpsafe.check.check import check_path
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, load_robot
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.path.for_robot import LENGTH, line_for

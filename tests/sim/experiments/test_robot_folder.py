@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, load_quietly
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.starting_file import starting_robot_toml
-from qpsafe.sensing.spots import load_spots
+from qpsafe.robot.robot_file.starting_file import starting_robot_toml
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.sim.experiments.shared.folder import copied_folder, with_keys
 from qpsafe.sim.experiments.shared.skin import skin_toml
 from qpsafe.sim.tuning.robot_file import farthest, write_folder

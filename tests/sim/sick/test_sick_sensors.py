@@ -42,7 +42,7 @@ def test_a_copy_goes_on_as_the_run_does_bit_by_bit():
 def test_a_case_that_could_show_at_no_moment_is_not_kept_nor_excused(wrong, capsys):
     """Nothing was tried, so nothing was kept; a contact or a limit passed counts all the same."""
     from qpsafe.cli.common import console, show_matrix
-    from qpsafe.cli.sick_sensors import show
+    from qpsafe.cli.sensors.sick_sensors import show
 
     untried = Result("stuck", "reported", 1, 1, 0, 0, 0, 0, 0.0, 0.2, 0.2)
     broken = untried._replace(**wrong)

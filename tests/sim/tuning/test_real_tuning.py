@@ -10,7 +10,7 @@ import pytest
 import qpsafe
 from qpsafe.sim.campaign.executors import dask_executor
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.trial import run_trial
+from qpsafe.sim.campaign.trials.trial import run_trial
 from qpsafe.sim.tuning.ask import BATCH
 from qpsafe.sim.tuning.journal import Journal
 from qpsafe.sim.tuning.objectives import Outcome

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.rows import Columns, columns_of
+from qpsafe.sim.campaign.trials.rows import Columns, columns_of
 from qpsafe.sim.tuning.judge import Judged, compared, sentence
 from qpsafe.sim.tuning.objectives import harm
 

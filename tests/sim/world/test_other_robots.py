@@ -14,7 +14,7 @@ import pytest
 from qpsafe.placement.surface import link_surface
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.robot import Robot
-from qpsafe.robot.spec import Region
+from qpsafe.robot.robot_file.spec import Region
 from qpsafe.sensing.body import body_hulls
 from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.sim.world.plant import Plant

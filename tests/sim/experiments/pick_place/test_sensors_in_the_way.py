@@ -12,7 +12,7 @@ from amounts import first
 
 from qpsafe.robot.loader import load_quietly
 from qpsafe.robot.robot import Robot
-from qpsafe.sensing.spots import load_spots
+from qpsafe.sensing.skin.spots import load_spots
 from qpsafe.sim.experiments.pick_place.for_robot import in_the_way
 from qpsafe.sim.experiments.shared.ready import made_ready, without
 

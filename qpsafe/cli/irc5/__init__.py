@@ -1,0 +1,1 @@
+"""Commands that speak with an IRC5, real or simulated."""

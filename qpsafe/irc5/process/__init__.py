@@ -1,0 +1,1 @@
+"""The process that a stream runs in: its priority, watchdog, output, requests and times."""

@@ -1,0 +1,1 @@
+"""From images and clouds of many points to the few that matter."""

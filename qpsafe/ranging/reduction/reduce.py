@@ -1,0 +1,174 @@
+"""From an image to the few points of it that matter: tables of one sensor, tiles of dense images, the compiled call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qpsafe.errors import ConfigurationError
+from qpsafe.ranging.reduction.looking_kernel import AROUND
+from qpsafe.ranging.reduction.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile, tile_sigma
+
+if TYPE_CHECKING:
+    from qpsafe.ranging.judge import Usable
+    from qpsafe.ranging.rules import RangeRules
+    from qpsafe.ranging.sensor import RangeSensor
+    from qpsafe.robot.wire import Wire
+    from qpsafe.sensing.hulls import HullSet
+    from qpsafe.sensing.rules import SensingRules
+
+Array = NDArray[np.float64]
+
+
+class Shown(NamedTuple):
+    """What an image shows, in numbers of zones.
+
+    Attributes:
+        valid: That tell anything.
+        hits: That see something within the sensor's range.
+        own: That see the robot itself.
+        known: That see known obstacles.
+        expected: Of those that were asked, that known things fill.
+        through: Of these, that see through what is there.
+        impossible: That read less than nothing.
+        seen: Whose points count.
+    """
+
+    valid: int
+    hits: int
+    own: int
+    known: int
+    expected: int
+    through: int
+    impossible: int
+    seen: int
+
+
+def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
+    """A sensor whose zones are tiles of another one's, and pixels along the edge of a tile.
+
+    Args:
+        sensor: Of many zones in rows and columns.
+        most: How many zones it may have.
+
+    Raises:
+        ConfigurationError: What stands side by side in rows and columns does not look side by side.
+    """
+    rows, columns = sensor.shape
+    size = 1
+    while -(-rows // size) * -(-columns // size) > most:
+        size += 1
+    if size == 1:
+        return sensor, 1
+    grid = sensor.directions.reshape(rows, columns, 3)
+    pitch = sensor.half_angle.reshape(rows, columns)
+    directions, angles = [], []
+    for top in range(0, rows, size):
+        for left in range(0, columns, size):
+            part = grid[top : top + size, left : left + size].reshape(-1, 3)
+            middle = part.mean(axis=0)
+            middle /= np.linalg.norm(middle)
+            directions.append(middle)
+            cone = pitch[top : top + size, left : left + size].ravel()
+            angles.append(float((np.arccos(np.clip(part @ middle, -1.0, 1.0)) + cone).max()))
+    shape = (-(-rows // size), -(-columns // size))
+    # half the diagonal of a square that is its share of a full sphere is 2.5 / sqrt(n)
+    if max(angles) >= min(5.0 * 2.5 / len(angles) ** 0.5 + float(pitch.max()), 0.25 * np.pi):
+        expected = f"rows and columns whose neighbours look side by side, as of all sensors of more than {most} zones"
+        raise ConfigurationError(f"RangeSensor {sensor.name!r}", "shape", sensor.shape, expected)
+    return replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=shape), size
+
+
+def view_of(directions: Array) -> tuple[float, ...]:
+    """The middle of all directions (z, 3), then cosine and sine of the cone around it that holds them."""
+    middle = directions.mean(axis=0)
+    size = float(np.linalg.norm(middle))
+    if size < 1e-3:  # all around
+        return 1.0, 0.0, 0.0, -1.0, 0.0
+    middle /= size
+    cosine = float(np.clip((directions @ middle).min(initial=1.0), -1.0, 1.0))
+    return *middle.tolist(), cosine, float(np.sqrt(1.0 - cosine * cosine))
+
+
+class Reducer:
+    """Reduces the images of one sensor.
+
+    Args:
+        sensor: The sensor.
+        rules: Numbers for images.
+        sensing: Tolerances.
+        hulls: The robot itself and known obstacles.
+        links: How many links the robot's wire has.
+
+    Attributes:
+        zones: The sensor, or its tiles.
+        size: Pixels along the edge of a tile.
+        distances, valid, sigma: Of the zones of the last image (z,).
+        found: All points of the last image that count, as many as it was told to show (z, 4).
+        kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
+    """
+
+    def __init__(
+        self, sensor: RangeSensor, rules: RangeRules, sensing: SensingRules, hulls: HullSet, links: int
+    ) -> None:
+        self.zones, self.size = tiled(sensor, rules.dense)
+        count = len(self.zones)
+        self._slants = np.tan(self.zones.half_angle)
+        self._numbers = np.array([
+            sensor.range_min, sensor.range_max, sensing.tolerance, rules.spread, rules.reach, rules.deviations,
+            *view_of(self.zones.directions),
+        ])  # fmt: skip
+        self._tables, self._each, self._support = hulls.tables, rules.each, rules.support
+        self._stride = farthest_zone(count)
+        self.found = np.empty((count, 4))
+        things = len(hulls.tables[0])
+        self._work = (
+            self.found, np.empty((links, count)), np.empty(count, dtype=np.int64),
+            np.empty((things, AROUND)), np.empty((2, things), dtype=np.int64),
+        )  # fmt: skip
+        self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
+        self.distances, self.valid, self.sigma = np.empty(count), np.zeros(count, dtype=np.bool_), np.empty(count)
+        self.kept = np.empty((links * rules.each, 4))
+        self._shown = np.zeros(SHOWN, dtype=np.int64)
+
+    def around(self, count: int, seen: int, most: int) -> Array:
+        """The points that the last image left, then others that count, evenly chosen, `most` in all (p, 3) [m].
+
+        Args:
+            count: How many points `kept` holds.
+            seen: How many points count.
+            most: p at most, or `count` if that is more.
+        """
+        every = -(-seen // max(most - count, 1)) if seen else 1
+        return np.concatenate((self.kept[:count, :3], self.found[:seen:every, :3]))
+
+    def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire, carrier: int) -> tuple[int, Shown]:
+        """Reduce an image: how many points `kept` holds now, and what the image shows.
+
+        Args:
+            image: Whose arrays fit.
+            pose: Of the sensor when it was taken (4, 4).
+            then: Poses of the robot's bodies when it was taken (b, 4, 4).
+            wire: The robot's, now.
+            carrier: The robot's body that the sensor sits on; -1 for none.
+        """
+        distances, valid, sigma = image.distances, image.valid, image.sigma
+        if self.size > 1:
+            shape, nearest, known = image.shape, *self._tiles
+            tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
+            if sigma.strides[0] == 0:  # one number
+                sigma = np.full(len(nearest), sigma[0])
+            else:
+                spread, sigma = sigma.reshape(shape), np.empty(len(nearest))
+                tile_sigma(distances.reshape(shape), valid.reshape(shape), spread, self.size, nearest, sigma)
+            distances, valid = nearest, known
+        self.distances, self.valid, self.sigma = distances, valid, sigma
+        count = reduce_zones(
+            distances, sigma, valid, self.zones.directions, self._slants, pose, self._numbers,
+            wire.starts, wire.ends, then, *self._tables, *self._work, carrier, self._each, self._stride, self.kept,
+            self._shown,
+        )  # fmt: skip
+        return count, Shown(*self._shown.tolist())

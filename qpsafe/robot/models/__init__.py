@@ -1,0 +1,1 @@
+"""Model files of robots, MJCF and URDF: read, checked, and made into kinematics and hulls."""

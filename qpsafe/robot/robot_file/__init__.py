@@ -1,0 +1,1 @@
+"""What a `robot.toml` may say, in SI units, and a first one for a model file."""
