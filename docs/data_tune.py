@@ -1,7 +1,9 @@
 """Write docs/data/tune.json and its figures from folders of `qpsafe tune`: python docs/data_tune.py FOLDER ...
 
 Of each run what the page needs is kept: the front, the choice, its judgement and what matters; of the first one all
-trials, for the figure. docs/data/tune-foreign.json, of an arm that nothing was tuned on, is written by
+trials, for the figure. `--add FOLDER ...` keeps what is there, and adds or replaces these runs.
+
+docs/data/tune-foreign.json, of an arm that nothing was tuned on, is written by
 
     python benchmarks/made_up_arm.py arm.urdf && qpsafe robots add arm.urdf --out arm
     qpsafe tune --robot arm --trials 49 --finals 200 --judge 450 --out tuned
@@ -60,8 +62,12 @@ if __name__ == "__main__":
         text = json_text(foreign(*sys.argv[2:]), indent=1)
         (DATA / "tune-foreign.json").write_text(text + "\n", encoding="utf-8")
         raise SystemExit
-    results = [json.loads((Path(folder) / "tune.json").read_text(encoding="utf-8")) for folder in sys.argv[1:]]
-    runs = [short(said) for said in results]
-    runs[0]["trials"] = results[0]["trials"]
-    (DATA / "tune.json").write_text(json_text({"runs": runs}, indent=1) + "\n", encoding="utf-8")
+    adding = sys.argv[1] == "--add"
+    folders = map(Path, sys.argv[1 + adding :])
+    results = [json.loads((folder / "tune.json").read_text(encoding="utf-8")) for folder in folders]
+    kept = json.loads((DATA / "tune.json").read_text(encoding="utf-8"))["runs"] if adding else []
+    runs = {(run["robot"], run["search"]["seed"]): run for run in [*kept, *map(short, results)]}
+    if not adding:
+        next(iter(runs.values()))["trials"] = results[0]["trials"]
+    (DATA / "tune.json").write_text(json_text({"runs": list(runs.values())}, indent=1) + "\n", encoding="utf-8")
     draw()
