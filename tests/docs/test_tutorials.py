@@ -1,4 +1,4 @@
-"""Every tutorial runs from start to end in an empty folder, and prints what the page says that it prints."""
+"""Every tutorial runs from start to end in an empty folder, and prints what its page says; `.ci/run` asks for that."""
 
 from __future__ import annotations
 
@@ -20,13 +20,7 @@ FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 #: What a page says about setting up; here everything is set up, in an empty folder.
 SET_UP = ("make ", "source ", "cd ", "pip ")
 QPSAFE = "from qpsafe.cli.main import main; main()"
-#: Tutorials that take longer than a coffee sip.
-SLOW = {"your-own-arm.md"}
-PAGES = [
-    pytest.param(page, id=page.name, marks=[pytest.mark.slow] if page.name in SLOW else [])
-    for page in sorted(FOLDER.glob("*.md"))
-    if page.name != "index.md"
-]
+PAGES = [pytest.param(page, id=page.name) for page in sorted(FOLDER.glob("*.md")) if page.name != "index.md"]
 
 
 class Block(NamedTuple):
@@ -89,6 +83,7 @@ def run(command: str, folder: Path, started: list[subprocess.Popen[bytes]]) -> s
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_the_tutorial_runs_in_an_empty_folder(page: Path, tmp_path: Path) -> None:
     """A block that begins with `# save as NAME` is a file; text that follows a command is what it prints."""

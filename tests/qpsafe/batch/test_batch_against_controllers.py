@@ -58,6 +58,7 @@ def test_fixed_poses_give_the_same_bits(pairs: Any, come: Any, name: str, count:
     assert loop.statuses["bad_input"] > 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycle", first(1, [True, False]))
 def test_programs_wait_at_their_events_and_tell_each_once(pairs: Any, come: Any, irb140: Any, cycle: bool) -> None:
     path = program(irb140, cycle)
@@ -128,6 +129,7 @@ def test_sick_sensors_are_the_robots_own(pairs: Any, irb140: Any) -> None:
         assert any(part in sentence for sentence in words) if part else not words
 
 
+@pytest.mark.slow
 def test_goals_out_of_reach_are_told_and_taken_back(pairs: Any, come: Any, irb140: Any) -> None:
     goal = qpsafe.FixedPose(shifted(irb140.pose("tcp", irb140.home), (1.5, 0.0, 0.0)))
     loop = pairs(lambda: qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", goal)]), 2)

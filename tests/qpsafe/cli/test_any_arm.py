@@ -32,6 +32,7 @@ def blunt(folder: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_motions_that_nobody_named_and_it_cannot_do_are_left_out(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     file = blunt(tmp_path)
     plan = make_plan(None, robot=str(file))
@@ -44,12 +45,14 @@ def test_motions_that_nobody_named_and_it_cannot_do_are_left_out(tmp_path: Path,
         make_plan(None, robot=str(file), motions="hold,pick")
 
 
+@pytest.mark.slow
 def test_an_arm_of_five_joints_holds(tmp_path: Path) -> None:
     motions = make_plan(None, robot=str(other_arms.write_arm(tmp_path, other_arms.SIX[:5]))).motions
     assert "hold" in motions
     assert "line" not in motions
 
 
+@pytest.mark.slow
 def test_a_folder_that_was_added_is_the_robot_of_every_command(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(made_up_arm.arm_urdf(), encoding="utf-8")
     result = CliRunner().invoke(app, ["robots", "add", "arm.urdf", "--out", "arm"])
@@ -71,6 +74,7 @@ def test_sensors_that_are_there_are_kept(tmp_path: Path) -> None:
     assert load_quietly(tmp_path).spots_path == tmp_path / "spots.toml"
 
 
+@pytest.mark.slow
 def test_a_folder_without_sensors_gets_some_in_a_copy(tmp_path: Path) -> None:
     file = other_arms.write_arm(tmp_path)
     folder = tmp_path / "mine"

@@ -168,6 +168,7 @@ def test_another_plan_in_the_folder_is_named_and_leaves_it_as_it_is(campaign: Ca
     assert {file: file.read_bytes() for file in (tmp_path / "kept").iterdir()} == before
 
 
+@pytest.mark.slow
 def test_what_ends_it_says_how_to_go_on(campaign: Campaign, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def failing(plan: Plan, trial: int) -> list[dict[str, Any]]:
         return made_up_trials.run(plan, trial) if trial < 9 else [1 / 0]  # type: ignore[list-item]

@@ -194,6 +194,7 @@ def test_rows_take_turns_and_are_compared_block_by_block() -> None:
     assert times["a"].ratio == times["a"].ratio_low == 1.0
 
 
+@pytest.mark.slow
 def test_bench_writes_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from qpsafe.bench.peers import MINK
     from qpsafe.sim.campaign.speed import Speed

@@ -90,6 +90,7 @@ def test_the_bundled_spots_are_what_the_command_at_their_head_makes(file: str, t
     assert (tmp_path / file).read_text(encoding="utf-8") == bundled
 
 
+@pytest.mark.slow
 def test_fewest_spots_for_a_probability(tmp_path: Path) -> None:
     result = run("--probability", "0.6", "--json", "--out", str(tmp_path))
     assert result.exit_code == 0, result.output

@@ -98,6 +98,7 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
     assert again == whole
 
 
+@pytest.mark.slow
 def test_values_are_written_into_a_robot_of_ones_own_and_only_there(tmp_path: Path) -> None:
     shutil.copytree(qpsafe.load_robot("irb140").folder, tmp_path / "own")
     before = present(qpsafe.load_robot(tmp_path / "own"))

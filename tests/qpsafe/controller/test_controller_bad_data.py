@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -320,7 +321,7 @@ anything = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(20, of=60), deadline=None)
 @given(st.lists(st.tuples(anything, anything, anything, st.none() | anything), min_size=1, max_size=6), st.booleans())
 def test_anything_at_all(run: Any, data: list[tuple[Any, Any, Any, Any]], stirred: bool) -> None:
     loop = run(FAST)

@@ -111,7 +111,7 @@ def judge(cases: Iterator[tuple[Any, str, np.ndarray, np.ndarray]], law: Any = N
 
 def test_arms_with_three_parallel_axes_rest_or_say_why_not(three_parallel_axes: Any) -> None:
     rng = np.random.default_rng(3)
-    arms = [three_parallel_axes(rng) for _ in range(some(2, of=4))]
+    arms = [three_parallel_axes(rng) for _ in range(some(1, of=4))]
     there, said = judge((arm, "tip", *case) for arm in arms for case in parallel_goals(rng, 4))
     assert there >= 0.9 * (there + said)
 

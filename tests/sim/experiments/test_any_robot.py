@@ -163,6 +163,7 @@ def test_too_few_joints_are_refused_before_anything_is_written(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_robot_that_slides_is_made_ready_too(arms: Any, tmp_path: Path) -> None:
     """A seventh axis that slides the arm along: its home is chosen, its motor is added, it stands still."""
     axes = (((0.0, 0.0, 0.2), (0.0, 0.0, 0.0), (0, 1, 0), 500.0), *arms.SIX)
@@ -173,6 +174,7 @@ def test_a_robot_that_slides_is_made_ready_too(arms: Any, tmp_path: Path) -> Non
     assert np.abs(log.q - made.robot.home).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_four_joints_are_enough_to_hold_a_pose(arms: Any, tmp_path: Path) -> None:
     made = made_ready("test", str(arms.write_arm(tmp_path, arms.SIX[:4])), tmp_path / "out", joints=4)
     assert quality(made.robot, Arm.of(made.robot), made.robot.home) > 0.05
@@ -191,6 +193,7 @@ def test_only_the_listed_robots_promise_what_was_tuned_for_them(arms: Any, tmp_p
     assert not all_kept([good, bad])
 
 
+@pytest.mark.slow
 def test_the_command_says_what_it_chose_and_is_honest(arms: Any, tmp_path: Path) -> None:
     file, out = arms.write_arm(tmp_path, shapes=False), tmp_path / "out"
     words = ["demo", "fixed", "--robot", str(file), "--out", str(out), "--duration", "1", "--no-video"]

@@ -37,6 +37,7 @@ def test_links_that_move_are_no_nearer_than_the_robot(name: str, speed: float, b
         assert run.moving_links > on_base + 0.01
 
 
+@pytest.mark.slow
 def test_sharp_sensors_are_what_is_asked_for() -> None:
     ideal, sharp = (
         next(iter(runs(qpsafe.load_robot("irb140"), speeds=(2.5,), names=("fixed",), sensor=sensor)))

@@ -54,6 +54,7 @@ def test_who_is_dragged_to_the_robot_makes_it_evade_and_come_back(live: Live) ->
     assert np.abs(back.reference.q - calm.reference.q).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.5, 2.0])
 def test_who_is_dragged_walks(live: Live, speed: float) -> None:
     """On the way one foot or the other stands on the floor and stays there, each swings; at the goal both stand."""
@@ -175,6 +176,7 @@ def test_a_recording_replays_bit_by_bit(tmp_path: Path) -> None:
     assert (found.same, found.ticks) == (True, 200)
 
 
+@pytest.mark.slow
 def test_furniture_of_a_cell_stands_there_and_is_known(tmp_path: Path) -> None:
     """A program leads the tool down, into a table if there is one: it stops above it. Recordings replay."""
     robot = load_robot("irb140")

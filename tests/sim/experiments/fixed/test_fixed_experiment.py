@@ -101,6 +101,7 @@ def test_robot_is_at_its_first_pose_again_without_a_wrist_flip(log: RunLog) -> N
     assert log.q_ref[-1] == pytest.approx(ROBOT.home, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_shorter_run_is_the_beginning_of_the_longer_one_bit_by_bit(log: RunLog, experiment: FixedExperiment) -> None:
     short = replace(experiment, duration=6.0).run()
     n = len(short.time)

@@ -33,6 +33,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, range(4)))
 def test_exactly_those_that_are_named_are_left_out(model: Path, tmp_path: Path, seed: int) -> None:
     named: list[str] = []
@@ -59,6 +60,7 @@ def test_exactly_those_that_are_named_are_left_out(model: Path, tmp_path: Path, 
     assert tomllib.loads(without(text, every.names)).get("spot", []) == []
 
 
+@pytest.mark.slow
 def test_all_are_kept_where_none_could_stay(model: Path, tmp_path: Path) -> None:
     def every(robot: Robot) -> tuple[str, ...]:
         spots = load_spots(robot)
