@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from qpsafe.irc5.packets import messages
-from qpsafe.irc5.packets.messages import RobotPacket, SensorPacket
+from qpsafe.irc5 import messages
+from qpsafe.irc5.messages import RobotPacket, SensorPacket
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference

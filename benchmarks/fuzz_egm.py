@@ -21,9 +21,9 @@ from random import Random
 import numpy as np
 
 from qpsafe.cli.outputs import try_file
-from qpsafe.irc5.packets.inbox import REFUSALS
-from qpsafe.irc5.packets.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
+from qpsafe.irc5.messages import MCI_STATES, RAPID_STATES, RobotPacket, encode_robot
 from qpsafe.irc5.session import EgmSession
+from qpsafe.irc5.transport.inbox import REFUSALS
 from qpsafe.limits import JointLimits
 from qpsafe.text.json_text import json_text
 
@@ -239,7 +239,7 @@ def fuzz_by_coverage(runs: int, corpus: str | None) -> int:
 
     import atheris
 
-    for name in ("qpsafe.irc5.packets.messages", "qpsafe.irc5.packets.inbox", "qpsafe.irc5.session"):
+    for name in ("qpsafe.irc5.messages", "qpsafe.irc5.transport.inbox", "qpsafe.irc5.session"):
         for thing in vars(sys.modules[name]).values():
             if getattr(thing, "__module__", None) == name:
                 for function in vars(thing).values() if isinstance(thing, type) else [thing]:

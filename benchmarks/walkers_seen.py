@@ -13,7 +13,7 @@ import numpy as np
 
 import qpsafe
 from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.sensing.skin.sharp import SharpConverter
+from qpsafe.sensing.sharp import SharpConverter
 from qpsafe.sim.experiments.fast_person import at_speed
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors

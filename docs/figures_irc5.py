@@ -10,7 +10,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from qpsafe import JointLimits, JointReference
-from qpsafe.irc5.packets.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import EgmSession, Phase
 
 HERE = Path(__file__).parent / "img"

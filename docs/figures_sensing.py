@@ -17,8 +17,8 @@ from noted import note
 
 import qpsafe
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.sensing.sharp import PEAK, SharpConverter, SharpCurve
 from qpsafe.sensing.skin.calibration_plot import calibration_figure
-from qpsafe.sensing.skin.sharp import PEAK, SharpConverter, SharpCurve
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 FOUND: dict[str, float] = {}

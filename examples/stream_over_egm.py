@@ -6,7 +6,7 @@ import threading
 import numpy as np
 
 import qpsafe
-from qpsafe.irc5.packets.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.streamer import EgmStreamer
 
 robot = qpsafe.load_robot("irb140")

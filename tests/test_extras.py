@@ -107,7 +107,7 @@ BARE = {
     "sim": "import qpsafe.sim.world.scene",
     "plots": "from qpsafe.sensing.skin.calibration_plot import calibration_figure; calibration_figure([])",
     "proxqp": "import qpsafe; qpsafe.HierarchicalLaw('paper', solver='proxqp')",
-    "irc5": "import qpsafe.irc5.packets.messages",
+    "irc5": "import qpsafe.irc5.messages",
     "mink": "import qpsafe.plugins.mink",
     "pink": "import qpsafe.plugins.pink",
     "realsense": "from qpsafe.ranging.adapters.realsense import RealSense; RealSense('wall')",

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.irc5.packets.messages import RobotPacket
+from qpsafe.irc5.messages import RobotPacket
 
 Array = NDArray[np.float64]
 

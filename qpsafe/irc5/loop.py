@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets.messages import RobotPacket
+from qpsafe.irc5.messages import RobotPacket
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
 from qpsafe.irc5.supervisor import State, StopCategory, Supervisor
 from qpsafe.tick import BAD_INPUT, FAULT, Tick

@@ -8,8 +8,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from qpsafe.irc5.distances import SensorInput
 from qpsafe.irc5.loop import ROBOT, StreamLoop
-from qpsafe.irc5.packets.distances import SensorInput
 from qpsafe.irc5.process.latency import Latency
 from qpsafe.irc5.process.realtime import resident
 from qpsafe.irc5.process.requests import Requests

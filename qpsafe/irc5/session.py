@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.cycle import Cycle, Phase
-from qpsafe.irc5.packets.axes import Axes, axes_of
-from qpsafe.irc5.packets.inbox import Arrival, Inbox, Sender
-from qpsafe.irc5.packets.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
+from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
+from qpsafe.irc5.transport.axes import Axes, axes_of
+from qpsafe.irc5.transport.inbox import Arrival, Inbox, Sender
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
 from qpsafe.text.words import counted

@@ -12,11 +12,11 @@ from types import TracebackType
 from typing import Self
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets.arrival import ask_for_times, receive
-from qpsafe.irc5.packets.axes import Axes
-from qpsafe.irc5.packets.messages import DEFAULT_PORT, MAX_SIZE
+from qpsafe.irc5.messages import DEFAULT_PORT, MAX_SIZE
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
+from qpsafe.irc5.transport.arrival import ask_for_times, receive
+from qpsafe.irc5.transport.axes import Axes
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.ranging.fusion import LookingThrough
 from qpsafe.ranging.reduction.candidates_kernel import LOST, STAMP, WRONG, lost_before
-from qpsafe.ranging.reduction.fusion import LookingThrough
 from qpsafe.sensing.hulls import HullSet
 
 if TYPE_CHECKING:

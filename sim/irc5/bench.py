@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
-from qpsafe.irc5.packets.messages import RobotPacket, encode_robot
+from qpsafe.irc5.messages import RobotPacket, encode_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments.path.experiment import PROGRAM
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
-from qpsafe.irc5.packets.axes import axes_of_robot
+from qpsafe.irc5.transport.axes import axes_of_robot
 from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments.by_name import experiment_loop
 from qpsafe.sim.experiments.pick_place.pick_loop import PickLoop

@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.irc5.packets.axes import Axes, axes_of
-from qpsafe.irc5.packets.messages import WRAP, MalformedPacket, RobotPacket, SensorPacket, decode_sensor
+from qpsafe.irc5.messages import WRAP, MalformedPacket, RobotPacket, SensorPacket, decode_sensor
+from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.sim.irc5.motion import EgmSettings, MotionLaw
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from qpsafe.irc5.packets.messages import RobotPacket, encode_robot
+from qpsafe.irc5.messages import RobotPacket, encode_robot
 from qpsafe.irc5.supervisor import StopCategory
 from qpsafe.sim.irc5.bench import Datagrams, Workbench
 from qpsafe.sim.irc5.in_process import ROBOT_ADDRESS

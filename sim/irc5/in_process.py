@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from qpsafe.controller import SafetyController
 from qpsafe.irc5.loop import LoopRules, StreamLoop
-from qpsafe.irc5.packets.axes import axes_of_robot
-from qpsafe.irc5.packets.messages import RobotPacket, SensorPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, SensorPacket, decode_sensor, encode_robot
 from qpsafe.irc5.process.warm_up import session_limits
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession
 from qpsafe.irc5.supervisor import Supervisor
+from qpsafe.irc5.transport.axes import axes_of_robot
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.irc5.packets.messages import RobotPacket, SensorPacket
+from qpsafe.irc5.messages import RobotPacket, SensorPacket
 from qpsafe.reference import JointReference
 from qpsafe.sim.irc5.controller import SimulatedIrc5
 from qpsafe.sim.irc5.motion import EgmSettings

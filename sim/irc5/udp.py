@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError, QpsafeError
-from qpsafe.irc5.packets.axes import Axes, axes_of
-from qpsafe.irc5.packets.distances import SensorOutput
-from qpsafe.irc5.packets.messages import (
+from qpsafe.irc5.distances import SensorOutput
+from qpsafe.irc5.messages import (
     MAX_SIZE,
     MalformedPacket,
     RobotPacket,
@@ -22,6 +21,7 @@ from qpsafe.irc5.packets.messages import (
     decode_sensor,
     encode_robot,
 )
+from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.sim.irc5.link import NO_FAULTS, Wire, WireFaults
 
 Array = NDArray[np.float64]

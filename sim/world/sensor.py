@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sensing.skin.sharp import SharpConverter
+from qpsafe.sensing.sharp import SharpConverter
 from qpsafe.sim.engine.tracks import people_of
 from qpsafe.sim.world.rays import SpotRays
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors

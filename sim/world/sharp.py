@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sensing.sharp import SharpCurve
 from qpsafe.sensing.skin.calibration import Fit, fit_curve
-from qpsafe.sensing.skin.sharp import SharpCurve
 
 Array = NDArray[np.float64]
 

@@ -92,8 +92,8 @@ def irc5_sim(
 
     realtime.one_thread()
     from qpsafe.cli.demos.any_robot import any_robot, own_folder
-    from qpsafe.irc5.packets.axes import axes_of_robot
     from qpsafe.irc5.process.requests import Requests
+    from qpsafe.irc5.transport.axes import axes_of_robot
     from qpsafe.sim.experiments.by_name import experiment_loop
     from qpsafe.sim.irc5.irc5_loop import Irc5Loop
     from qpsafe.sim.irc5.link import WireFaults

@@ -18,7 +18,7 @@ from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from qpsafe.controller import SafetyController
-    from qpsafe.irc5.packets.distances import SensorInput
+    from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.process.realtime import Grant
     from qpsafe.irc5.records.log import ReferenceWriter
     from qpsafe.sim.web.watch import Watch
@@ -122,16 +122,16 @@ def stream(
         screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
         from qpsafe.cli.irc5.stream_report import result_of, show
         from qpsafe.cli.irc5.stream_speaker import Speaker
+        from qpsafe.irc5.distances import SensorInput
         from qpsafe.irc5.loop import LoopRules, StreamLoop
-        from qpsafe.irc5.packets.axes import axes_of_robot
-        from qpsafe.irc5.packets.distances import SensorInput
-        from qpsafe.irc5.packets.event_output import EventOutput
         from qpsafe.irc5.process.warm_up import session_limits, warm_up
         from qpsafe.irc5.process.watchdog import Watchdog
         from qpsafe.irc5.rules import SessionRules
         from qpsafe.irc5.run import run_stream
         from qpsafe.irc5.streamer import EgmStreamer
         from qpsafe.irc5.supervisor import Supervisor
+        from qpsafe.irc5.transport.axes import axes_of_robot
+        from qpsafe.irc5.transport.event_output import EventOutput
 
         checked = _Checked(unchecked, sensors, screen)
         controller = _controller(robot, program, cell, experiment, make_law(law, projection), checked)

@@ -10,8 +10,8 @@ from qpsafe.text.words import counted, growth
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.loop import StreamLoop
-    from qpsafe.irc5.packets.distances import SensorInput
     from qpsafe.irc5.process.realtime import Grant
     from qpsafe.irc5.process.watchdog import Watchdog
     from qpsafe.irc5.records.log import ReferenceWriter

@@ -6,12 +6,12 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from qpsafe.irc5.packets.inbox import REFUSALS
 from qpsafe.irc5.supervisor import State
+from qpsafe.irc5.transport.inbox import REFUSALS
 
 if TYPE_CHECKING:
+    from qpsafe.irc5.distances import SensorInput
     from qpsafe.irc5.loop import StreamLoop
-    from qpsafe.irc5.packets.distances import SensorInput
     from qpsafe.irc5.process.outlet import Outlet
     from qpsafe.irc5.run import StreamRun
     from qpsafe.irc5.streamer import EgmStreamer

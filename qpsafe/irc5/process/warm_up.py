@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from qpsafe.irc5.packets.axes import axes_of_robot
-from qpsafe.irc5.packets.messages import RobotPacket, decode_robot, encode_robot
+from qpsafe.irc5.messages import RobotPacket, decode_robot, encode_robot
 from qpsafe.irc5.session import EgmSession
+from qpsafe.irc5.transport.axes import axes_of_robot
 from qpsafe.limits import JointLimits
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from qpsafe.errors import ConfigurationError, RobotFileError
-from qpsafe.sensing.skin.sharp import SharpConverter, SharpCurve
+from qpsafe.sensing.sharp import SharpConverter, SharpCurve
 from qpsafe.text.complaints import expected_words
 from qpsafe.text.toml_parse import read_bounded, toml_table
 from qpsafe.text.words import counted

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sensing.skin.sharp import SharpConverter
+from qpsafe.sensing.sharp import SharpConverter
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.engine.sight import Sight
 from qpsafe.sim.engine.spot_rays import SpotReader

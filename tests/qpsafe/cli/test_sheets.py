@@ -59,8 +59,8 @@ def of_compilation(screen: Console, folder: Path) -> None:
 
 
 def of_calibration(screen: Console, folder: Path) -> None:
+    from qpsafe.sensing.sharp import SharpCurve
     from qpsafe.sensing.skin.calibration import Fit
-    from qpsafe.sensing.skin.sharp import SharpCurve
 
     curve, distances = SharpCurve(), np.linspace(0.2, 0.8, 120)
     fits = [Fit(f"{name} {HOSTILE}", curve, distances, curve.voltage(distances + 0.1), 117) for name in "ab"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets.distances import Distances, SensorInput, SensorOutput, decode, encode
+from qpsafe.irc5.distances import Distances, SensorInput, SensorOutput, decode, encode
 from qpsafe.sensing.rules import SensingRules
 
 VALUES = st.integers(0, 30).flatmap(lambda k: arrays(np.float64, k))  # NaN and infinities too

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets import messages
-from qpsafe.irc5.packets import qpsafe_egm_pb2 as wire
-from qpsafe.irc5.packets.axes import Axes, axes_of, axes_of_robot
-from qpsafe.irc5.packets.messages import MalformedPacket, RobotPacket, SensorPacket
+from qpsafe.irc5 import messages
+from qpsafe.irc5 import qpsafe_egm_pb2 as wire
+from qpsafe.irc5.messages import MalformedPacket, RobotPacket, SensorPacket
 from qpsafe.irc5.session import EgmSession
+from qpsafe.irc5.transport.axes import Axes, axes_of, axes_of_robot
 from qpsafe.limits import JointLimits
 from qpsafe.robot.loader import bundled_robots
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5

@@ -8,7 +8,7 @@ from egm_wire import A_MAX, DT, START, V_MAX, N, Source, Wire
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.irc5.packets import messages
+from qpsafe.irc5 import messages
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Phase
 from qpsafe.reference import JointReference

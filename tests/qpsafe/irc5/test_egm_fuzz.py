@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.irc5.packets.messages import MalformedPacket, decode_sensor
+from qpsafe.irc5.messages import MalformedPacket, decode_sensor
 
 
 def load(name: str) -> ModuleType:

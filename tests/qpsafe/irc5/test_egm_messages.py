@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.irc5.packets import messages
-from qpsafe.irc5.packets import qpsafe_egm_pb2 as wire
-from qpsafe.irc5.packets.messages import MalformedPacket, RobotPacket, SensorPacket
+from qpsafe.irc5 import messages
+from qpsafe.irc5 import qpsafe_egm_pb2 as wire
+from qpsafe.irc5.messages import MalformedPacket, RobotPacket, SensorPacket
 
 ROOT = Path(__file__).resolve().parents[3]
 N = 6
@@ -205,7 +205,7 @@ def test_the_generated_module_is_that_of_the_proto() -> None:
 @pytest.mark.parametrize("peer", ["ABBRobotEGM", "abb_robot_client.egm"])
 def test_our_messages_load_beside_those_of_others(peer: str) -> None:
     """Own file name and package: nothing collides, whichever comes first."""
-    for order in (f"{peer}, qpsafe.irc5.packets.messages", f"qpsafe.irc5.packets.messages, {peer}"):
+    for order in (f"{peer}, qpsafe.irc5.messages", f"qpsafe.irc5.messages, {peer}"):
         subprocess.run([sys.executable, "-c", f"import {order}"], check=True, timeout=60, capture_output=True)
 
 

@@ -13,7 +13,7 @@ import pytest
 from amounts import some
 
 import qpsafe
-from qpsafe.irc5.packets.messages import MAX_SIZE, MCI_STATES, RAPID_STATES, RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import MAX_SIZE, MCI_STATES, RAPID_STATES, RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.limits import JointLimits

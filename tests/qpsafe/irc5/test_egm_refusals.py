@@ -9,8 +9,8 @@ import pytest
 from egm_wire import A_MAX, DT, LIMITS, PEER, V_MAX, N, Wire
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets import messages
-from qpsafe.irc5.packets.messages import SensorPacket
+from qpsafe.irc5 import messages
+from qpsafe.irc5.messages import SensorPacket
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import EgmSession, Phase
 from qpsafe.limits import JointLimits

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from egm_wire import DT, START, N, Wire
 
-from qpsafe.irc5.packets import messages
+from qpsafe.irc5 import messages
 from qpsafe.irc5.session import Phase
 from qpsafe.reference import JointReference
 

@@ -8,7 +8,7 @@ from egm_wire import DT, LIMITS, N, Wire
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.irc5.packets.messages import SensorPacket
+from qpsafe.irc5.messages import SensorPacket
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import EgmSession
 from qpsafe.reference import JointReference

@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets.event_output import EventOutput, address
+from qpsafe.irc5.transport.event_output import EventOutput, address
 
 
 def test_one_datagram_a_name() -> None:

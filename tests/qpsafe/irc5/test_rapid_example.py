@@ -11,7 +11,7 @@ import pytest
 
 from qpsafe.controller import SafetyController
 from qpsafe.irc5.loop import LoopRules
-from qpsafe.irc5.packets.messages import DEFAULT_PORT
+from qpsafe.irc5.messages import DEFAULT_PORT
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.sim.irc5.motion import EgmSettings
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import qpsafe
 from qpsafe.irc5.loop import LoopRules, StreamLoop
-from qpsafe.irc5.packets.messages import decode_sensor, encode_robot
+from qpsafe.irc5.messages import decode_sensor, encode_robot
 from qpsafe.irc5.process.requests import LEAVE, Requests
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.run import CHECK, GONE, StreamRun, run_stream

@@ -10,7 +10,7 @@ import pytest
 
 import qpsafe
 from qpsafe.irc5.loop import LoopRules, StreamLoop, gate
-from qpsafe.irc5.packets.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
 from qpsafe.irc5.supervisor import State, StopCategory
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
-from qpsafe.irc5.packets.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
 from qpsafe.irc5.records.log import read_references
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.experiments.by_name import experiment_loop

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qpsafe.cli.irc5.stream_speaker import LONGEST, Speaker, refused
-from qpsafe.irc5.packets.distances import SensorCounts
-from qpsafe.irc5.packets.inbox import REFUSALS
+from qpsafe.irc5.distances import SensorCounts
 from qpsafe.irc5.supervisor import Event, State, Transition
+from qpsafe.irc5.transport.inbox import REFUSALS
 
 
 class Page:

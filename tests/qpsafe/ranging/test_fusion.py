@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.ranging.reduction.fusion import LookingThrough
+from qpsafe.ranging.fusion import LookingThrough
 from qpsafe.ranging.sensor import RangeSensor
 
 seeds = st.integers(0, 2**32 - 1)

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 import qpsafe
 from qpsafe.cli.main import app
+from qpsafe.sensing.sharp import SharpConverter, SharpCurve
 from qpsafe.sensing.skin.calibration import calibration_text, fit_curve, load_converter, read_calibration
 from qpsafe.sensing.skin.pairs_file import read_pairs
-from qpsafe.sensing.skin.sharp import SharpConverter, SharpCurve
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 
 curves = st.builds(SharpCurve, st.floats(0.5, 0.9), st.floats(0.04, 0.15), st.floats(-0.05, 0.1))

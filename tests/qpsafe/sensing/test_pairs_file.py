@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
+from qpsafe.sensing.sharp import SharpCurve
 from qpsafe.sensing.skin.calibration import fit_curve, implausible
 from qpsafe.sensing.skin.pairs_file import read_pairs
-from qpsafe.sensing.skin.sharp import SharpCurve
 
 DISTANCES = {"m": 1, "cm": 100, "mm": 1000}
 VOLTAGES = {"V": 1, "mV": 1000}

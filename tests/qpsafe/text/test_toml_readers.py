@@ -24,8 +24,8 @@ import qpsafe
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.sensor_file import read_range_sensors
 from qpsafe.robot.loader import load_robot
+from qpsafe.sensing.sharp import SharpCurve
 from qpsafe.sensing.skin.calibration import calibration_text, fit_curve, read_calibration
-from qpsafe.sensing.skin.sharp import SharpCurve
 from qpsafe.sensing.skin.spots import SpotArray
 from qpsafe.sim.stories.file import load_story
 from qpsafe.tasks.program_file import MOST_CHECKS, load_program

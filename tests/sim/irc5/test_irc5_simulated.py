@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.packets.messages import SensorPacket, encode_sensor
+from qpsafe.irc5.messages import SensorPacket, encode_sensor
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5
 from qpsafe.sim.irc5.link import Wire, WireFaults
 from qpsafe.sim.irc5.motion import EgmSettings, MotionLaw

@@ -8,7 +8,7 @@ import pytest
 
 import qpsafe
 from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.sensing.skin.sharp import SharpConverter
+from qpsafe.sensing.sharp import SharpConverter
 from qpsafe.sensing.velocity import STILL
 from qpsafe.sim.world.sharp import SharpModel, SharpSensors
 

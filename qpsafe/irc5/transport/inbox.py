@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.irc5.packets.axes import Axes, axes_of
-from qpsafe.irc5.packets.messages import REASONS, WRAP, MalformedPacket, RobotPacket, decode_robot
+from qpsafe.irc5.messages import REASONS, WRAP, MalformedPacket, RobotPacket, decode_robot
 from qpsafe.irc5.rules import SessionRules
+from qpsafe.irc5.transport.axes import Axes, axes_of
 
 #: Address and port.
 Sender = tuple[str, int]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
 from qpsafe.extras import require
-from qpsafe.irc5.packets.axes import Axes, axes_of
+from qpsafe.irc5.transport.axes import Axes, axes_of
 
 require("irc5", "EGM", "google.protobuf")
-_wire: Any = import_module("qpsafe.irc5.packets.qpsafe_egm_pb2")
+_wire: Any = import_module("qpsafe.irc5.qpsafe_egm_pb2")
 
 #: EGM's port, unless the robot's configuration says otherwise.
 DEFAULT_PORT = 6510

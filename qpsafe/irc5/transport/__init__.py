@@ -1,0 +1,1 @@
+"""Around the datagrams: which joints they tell, when they came, the newest of them, names of events."""
