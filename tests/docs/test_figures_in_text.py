@@ -149,16 +149,16 @@ def tune() -> list[str]:
 
 def tune_others() -> list[str]:
     """Searches of other seeds and of other bundled robots; nothing of any surely does less harm."""
-    runs = measured("tune")["runs"]
-    harms, losses = ([run["judgement"]["means"][key] for run in runs] for key in ("harm", "lost"))
-    assert not any(harm["high"] < 0.0 for harm in harms)
-    assert all(lost["high"] < 0.0 for lost in losses)
-    for run in runs[1:3]:
+    first, *others = measured("tune")["runs"]
+    told = []
+    for run in others:
         assert run["chosen"]["harm"] < run["present"]["harm"]
         assert run["chosen"]["lost"] < run["present"]["lost"]
-    told = " and ".join(f"{harm['value']:+.4f} (p = {harm['p']:.2g})" for harm in harms[1:3])
-    gained = " and ".join(f"{lost['value']:+.2f} s" for lost in losses[1:3])
-    return [f"harm {told}, work lost {gained}, which is sure"]
+        harm, lost = (run["judgement"]["means"][key] for key in ("harm", "lost"))
+        gained = f"for work lost {lost['value']:+.2f} s (p = {lost['p']:.2g})"
+        told.append(f"harm {harm['value']:+.4f} (p = {harm['p']:.2g}) {gained}")
+    assert not any(run["judgement"]["means"]["harm"]["high"] < 0.0 for run in [first, *others])
+    return told
 
 
 def tune_foreign(bundled: dict[str, Any]) -> list[str]:
