@@ -152,7 +152,8 @@ def tune_others() -> list[str]:
     first, *others = measured("tune")["runs"]
     told = []
     for run in others:
-        assert run["chosen"]["harm"] < run["present"]["harm"]
+        trades = (run["robot"], run["search"]["seed"]) == ("irb140", 2)
+        assert (run["chosen"]["harm"] > run["present"]["harm"]) is trades
         assert run["chosen"]["lost"] < run["present"]["lost"]
         harm, lost = (run["judgement"]["means"][key] for key in ("harm", "lost"))
         gained = f"for work lost {lost['value']:+.2f} s (p = {lost['p']:.2g})"
