@@ -68,7 +68,7 @@ class StreamLoop:
         rules: When to stop.
 
     Raises:
-        ConfigurationError: A joint slides; the wire has angles.
+        ConfigurationError: A joint slides, while the wire has angles; or more silence is borne than by the session.
 
     Attributes:
         tick: Of the controller, the last one; None before.
@@ -90,6 +90,10 @@ class StreamLoop:
         self.controller, self.session = controller, session
         self.supervisor = Supervisor() if supervisor is None else supervisor
         self.rules = LoopRules() if rules is None else rules
+        most = session.rules.silence
+        if self.rules.silence > most:  # the robot would be held after that all the same, as one that was started anew
+            expected = f"at most the session's, {most:g} s: a packet after that is a new start"
+            raise ConfigurationError("StreamLoop", "silence", self.rules.silence, expected)
         self.tick: Tick | None = None
         self.measured: Array | None = None
         self.events: list[str] = []

@@ -150,16 +150,20 @@ def tune() -> list[str]:
 def tune_others() -> list[str]:
     """Searches of other seeds and of other bundled robots; nothing of any surely does less harm."""
     first, *others = measured("tune")["runs"]
-    told = []
-    for run in others:
-        trades = (run["robot"], run["search"]["seed"]) == ("irb140", 2)
-        assert (run["chosen"]["harm"] > run["present"]["harm"]) is trades
-        assert run["chosen"]["lost"] < run["present"]["lost"]
+    better = [run for run in others if all(run["chosen"][key] < run["present"][key] for key in ("harm", "lost"))]
+    trading = [run for run in others if run not in better]
+    assert not any(run["judgement"]["means"]["harm"]["high"] < 0.0 for run in [first, *others])
+
+    def cost(run: dict[str, Any]) -> str:
         harm, lost = (run["judgement"]["means"][key] for key in ("harm", "lost"))
         gained = f"for work lost {lost['value']:+.2f} s (p = {lost['p']:.2g})"
-        told.append(f"harm {harm['value']:+.4f} (p = {harm['p']:.2g}) {gained}")
-    assert not any(run["judgement"]["means"]["harm"]["high"] < 0.0 for run in [first, *others])
-    return told
+        return f"harm {harm['value']:+.4f} (p = {harm['p']:.2g}) {gained}"
+
+    return [
+        f"What {('none', 'one', 'two', 'three', 'four')[len(better)]} of them chose was better in both",
+        *map(cost, better),
+        *(f"search {run['search']['seed']} trades in its finals already, and costs {cost(run)}" for run in trading),
+    ]
 
 
 def tune_foreign(bundled: dict[str, Any]) -> list[str]:

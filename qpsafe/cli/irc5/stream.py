@@ -146,7 +146,8 @@ def stream(
             inlet = SensorInput(len(controller.spots), sensor_host, sensor_port)
             stack.callback(inlet.close)
         names = controller.robot.joint_names
-        rules = SessionRules(ramp_in=ramp_in, ramp_out=ramp_out)
+        same = max(SessionRules.silence, silence)  # until then it is the same robot
+        rules = SessionRules(ramp_in=ramp_in, ramp_out=ramp_out, silence=same)
         axes = axes_of_robot(controller.robot)
         streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names, axes)
         stack.callback(streamer.close)

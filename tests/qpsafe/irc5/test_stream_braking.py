@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from amounts import some
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import qpsafe
@@ -68,13 +68,20 @@ class Swaying:
 class Stage:
     """`run_stream`'s streamer, clock and robot; `deeds` are done at the beginning of their cycles."""
 
-    def __init__(self, deeds: dict[int, list[Callable[[], object]]], silent_after: float = math.inf) -> None:
+    def __init__(
+        self,
+        deeds: dict[int, list[Callable[[], object]]],
+        silent_after: float = math.inf,
+        silent_until: float = math.inf,
+        silence: float = 0.1,
+    ) -> None:
         self.now, self.cycle, self.response = 0.0, 0, 1e-4
-        self.deeds, self.silent_after = deeds, silent_after
-        self.session = EgmSession(LIMITS, SessionRules(ramp_in=0.1))
+        self.deeds, self.silent_after, self.silent_until = deeds, silent_after, silent_until
+        self.session = EgmSession(LIMITS, SessionRules(ramp_in=0.1, silence=max(1.0, silence)))
         self.said: list[Transition] = []
         supervisor = Supervisor(lambda: self.now, on_transition=self.said.append)
-        self.loop = StreamLoop(Swaying(), self.session, supervisor)  # type: ignore[arg-type]
+        rules = LoopRules(silence=silence)
+        self.loop = StreamLoop(Swaying(), self.session, supervisor, rules)  # type: ignore[arg-type]
         self.irc5 = SimulatedIrc5(IdealBody(ROBOT.home, lag=0.0))
         self.q: list[np.ndarray] = []
         self.qd: list[np.ndarray] = []
@@ -85,7 +92,7 @@ class Stage:
         assert self.cycle < 3000, "the stream did not end"
         for deed in self.deeds.get(self.cycle, ()):
             deed()
-        if self.cycle > self.silent_after:
+        if self.silent_after < self.cycle <= self.silent_until:
             self.now += timeout
             return None
         self.now += 0.004
@@ -234,8 +241,7 @@ def test_the_stream_ends_some_time_after_the_robot_has(stops_first: bool) -> Non
 @pytest.mark.parametrize("silence", [0.05, 0.1, 0.7, 2.0, 60.0])
 def test_a_stream_that_is_to_end_does_not_wait_long_for_a_robot_that_has_gone(silence: float) -> None:
     """However patient it is with one that it drives: that one is held after the silence, and may speak again."""
-    stage = Stage({}, silent_after=200)
-    stage.loop.rules = LoopRules(silence=silence)
+    stage = Stage({}, silent_after=200, silence=silence)
     asked = Requests()
 
     def leave(run: StreamRun) -> None:
@@ -246,6 +252,26 @@ def test_a_stream_that_is_to_end_does_not_wait_long_for_a_robot_that_has_gone(si
     assert run.silent <= max(min(silence, GONE), 0.2) + 0.05  # it is asked 0.2 s after the last packet
     assert run.silent >= min(silence, GONE)
     assert run.troubles == []
+
+
+@given(st.floats(0.05, 5.0), st.integers(1, 300))
+@settings(max_examples=some(15, of=60))
+def test_a_robot_is_held_if_and_only_if_it_was_silent_for_longer_than_is_borne(silence: float, passes: int) -> None:
+    """Within it the stream goes on as if nothing had been; also where a session by itself would see a new start."""
+    assume(abs(0.02 * passes - silence) > 0.03)
+    stage = Stage({}, silent_after=200, silent_until=200 + passes, silence=silence)
+    stage.run(duration=2.0 + 0.02 * passes)
+    stops = [t.cause for t in stage.said if t.after in (State.STOPPING, State.STOPPED)]
+    assert any("silent for" in cause for cause in stops) is (0.02 * passes > silence)
+    if 0.02 * passes < silence:
+        assert len(stops) == 2  # at the end only
+        assert sum(t.after is State.SEEDING for t in stage.said) == 1
+
+
+def test_more_silence_than_the_session_bears_is_refused_by_name() -> None:
+    session = EgmSession(LIMITS, SessionRules(silence=0.5))
+    with pytest.raises(qpsafe.ConfigurationError, match=r"silence = 0\.6: expected at most the session's, 0\.5 s"):
+        StreamLoop(Swaying(), session, None, LoopRules(silence=0.6))  # type: ignore[arg-type]
 
 
 def test_events_are_in_the_report_whether_anybody_is_told_or_not() -> None:
