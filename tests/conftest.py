@@ -6,14 +6,18 @@ are left out, others draw less, see benchmarks/amounts.py.
 
 import importlib
 import os
-from contextlib import suppress
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import amounts
 import pytest
 from hypothesis import settings
 
 from qpsafe.bench.compilation import modules
+from qpsafe.compiled import compiled
 
 try:
     import fcntl
@@ -44,16 +48,36 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Say how much is drawn; let one process after another make the kernels ready: from an empty cache all would
-    compile every one at once.
-    """
+    """Say how much is drawn; make the kernels ready, all processes of the run together."""
     os.environ[amounts.VARIABLE] = amounts.FEW if "not slow" in config.option.markexpr else amounts.ALL
     settings.register_profile(
-        "here", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=amounts.some(30, 100)
+        "here", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=amounts.some(20, 100)
     )
     settings.load_profile("here")
-    if hasattr(config, "workerinput") and fcntl is not None:
-        with Path(__file__).open("rb") as here, suppress(ImportError):  # whatever cannot be imported, tests tell
-            fcntl.flock(here, fcntl.LOCK_EX)
-            for name in modules():
-                importlib.import_module(name)
+    worker = getattr(config, "workerinput", {}).get("workerid")
+    if worker is not None and fcntl is not None:
+        with suppress(ImportError):  # whatever cannot be imported, tests tell
+            make_ready(int(worker.removeprefix("gw")))
+
+
+def make_ready(worker: int) -> None:
+    """Import all kernels, each compiled by the process that comes to it first; the others wait, and load it.
+
+    From an empty cache all processes would compile every one. Every second process begins at the other end, so that
+    two of them compile different ones.
+    """
+    over = compiled._Watch.over
+
+    @contextmanager
+    def alone(watch: Any, kernel: str) -> Iterator[None]:
+        with Path(str(sys.modules[kernel.rpartition(".")[0]].__file__)).open("rb") as source:
+            fcntl.flock(source, fcntl.LOCK_EX)
+            with over(watch, kernel):
+                yield
+
+    compiled._Watch.over = alone  # type: ignore[method-assign,assignment]
+    try:
+        for name in modules()[:: -1 if worker % 2 else 1]:
+            importlib.import_module(name)
+    finally:
+        compiled._Watch.over = over  # type: ignore[method-assign]

@@ -8,7 +8,7 @@ import shlex
 import subprocess
 import sys
 import types
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -57,8 +57,17 @@ def anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
+def slow_unless(quick: Callable[[Path], bool], paths: Iterable[Path]) -> list[Any]:
+    """Files of a parameter, those that take long marked slow; `.ci/run` runs them after the site is built."""
+    return [pytest.param(path, id=label(path), marks=() if quick(path) else pytest.mark.slow) for path in paths]
+
+
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if fences(page, "python") and not is_tutorial(page)], ids=label
+    "page",
+    slow_unless(
+        lambda page: page == README,
+        (page for page in PAGES if fences(page, "python") and not is_tutorial(page)),
+    ),
 )
 def test_snippets_run_in_order(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One fresh namespace per page; errors point to the line of the page."""
@@ -185,7 +194,7 @@ def run_as_main(code: str, path: Path, arguments: Sequence[str], monkeypatch: py
     return 0
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=label)
+@pytest.mark.parametrize("example", slow_unless(lambda path: path.name == "hello_controller.py", EXAMPLES))
 def test_examples_run_and_say_something(
     example: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +204,7 @@ def test_examples_run_and_say_something(
     assert capsys.readouterr().out.strip()
 
 
+@pytest.mark.slow
 def test_an_example_runs_in_a_python_of_its_own() -> None:
     command = [sys.executable, "examples/hello_controller.py"]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)

@@ -79,6 +79,7 @@ def test_every_parameter_of_many_is_explained() -> None:
     assert {name: missing for path in FILES for name, missing in unexplained(path).items()} == {}
 
 
+@pytest.mark.slow
 def test_no_parameter_is_explained_that_is_not_there() -> None:
     stale = {}
     for path in FILES:

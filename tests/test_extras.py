@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from amounts import first
 from packaging.requirements import Requirement
 from typer.main import get_command
 
@@ -152,6 +153,7 @@ def run(folder: Path, code: str, *words: str) -> dict[str, object]:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_the_loop_runs_without_any_extra(tmp_path: Path) -> None:
     """Every public name, every bundled robot and a URDF, with nothing installed but the base's dependencies."""
     found = run(tmp_path, f"urdf = {str(arm(tmp_path))!r}\n" + LOOP, "")
@@ -159,7 +161,7 @@ def test_the_loop_runs_without_any_extra(tmp_path: Path) -> None:
     assert set(map(tuple, found.values())) == {("ok", True)}  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("present", "asked"), [("", BARE), ("sim", WITH_SIM)])
+@pytest.mark.parametrize(("present", "asked"), first(1, [("", BARE), ("sim", WITH_SIM)]))
 def test_what_is_missing_is_named_by_its_extra(present: str, asked: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text("<mujoco/>")
     said = run(tmp_path, ASK, present, json.dumps(asked), str(tmp_path))

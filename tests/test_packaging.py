@@ -199,6 +199,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_unpacked_sdist_is_a_whole_source_tree(tmp_path: Path) -> None:
     """Whatever is tracked is in it, so that its README's commands work."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)

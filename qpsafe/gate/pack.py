@@ -34,6 +34,7 @@ MOST = 16  # cells that are kept a robot
 _surroundings: WeakKeyDictionary[Robot, OrderedDict[Any, Any]] = WeakKeyDictionary()
 _capsules: WeakKeyDictionary[Robot, Capsules] = WeakKeyDictionary()
 _bare: WeakKeyDictionary[Robot, Capsules] = WeakKeyDictionary()
+_levers: WeakKeyDictionary[Robot, Array] = WeakKeyDictionary()
 
 
 class Group(NamedTuple):
@@ -55,6 +56,15 @@ def robot_capsules(robot: Robot) -> Capsules:
     if robot not in _capsules:
         _capsules[robot] = joined(capsules_of(body_hulls(robot)), bare_links(robot))
     return _capsules[robot]
+
+
+def capsule_levers(robot: Robot) -> Array:
+    """How fast each joint moves any point of each capsule's axis at most (c, n) [m/rad, 1]; made once a robot."""
+    if robot not in _levers:
+        capsules = robot_capsules(robot)
+        rows = [levers(robot, int(body), ends) for body, ends in zip(capsules.bodies, capsules.ends, strict=True)]
+        _levers[robot] = np.reshape(rows, (len(rows), robot.nq))
+    return _levers[robot]
 
 
 def bare_links(robot: Robot) -> Capsules:
@@ -144,7 +154,7 @@ def pack(
     """
     capsules, tree, n = robot_capsules(robot), robot.tree, robot.nq
     rules, limits, max_age = figures
-    far = [levers(robot, int(b), ends) for b, ends in zip(capsules.bodies, capsules.ends, strict=True)]
+    far = capsule_levers(robot)
     pairs = np.vstack([np.zeros((0, 2), dtype=np.int64), *(group.pairs for group in groups)])
     sizes = np.array((n, len(far), len(groups), len(pairs), len(solids.index), len(solids.vertices),
                       len(solids.neighbours), len(solids.planes)), dtype=np.int64)  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,11 +80,8 @@ class ClearanceLimit(Fixed):
         if not isinstance(solids, Solids):
             raise ConfigurationError("ClearanceLimit", "solids", solids, "Solids.of(robot, ...)")
         self.solids, self.margin = solids, float(margin)
-        never = never_nearer(solids, robot, self.margin)
-        own = [pair for pair in map(tuple, solids.own.tolist()) if pair not in never]
-        pairs = np.vstack((solids.furniture, pairs_of(own)))
         #: For compiled code, see `nearness.tables_of`.
-        self.blocks = blocks_of(solids, robot, pairs, self.margin)
+        self.blocks = _blocks_for(solids, robot, self.margin)
         self._pairs = tables_of(*self.blocks).pairs
         #: Joints and shapes.
         self.size = robot.nq, len(solids.names)
@@ -115,6 +113,24 @@ class ClearanceLimit(Fixed):
         rows = self._rows
         A, high, gaps = rows.A[:count].copy(), rows.high[:count].copy(), rows.gaps[:count].copy()
         return ClearanceLevel(A, high, gaps, self._pairs[rows.which[:count]], self.solids.names)
+
+
+_kept: WeakKeyDictionary[Solids, tuple[ref[Robot], float, tuple[Array, NDArray[np.int64]]]] = WeakKeyDictionary()
+
+
+def _blocks_for(solids: Solids, robot: Robot, margin: float) -> tuple[Array, NDArray[np.int64]]:
+    """The blocks of pairs that may come nearer than a margin [m]; the last ones are kept: controllers of a cell share
+    its solids.
+    """
+    if solids in _kept:
+        of, at, blocks = _kept[solids]
+        if of() is robot and at == margin:
+            return blocks
+    never = never_nearer(solids, robot, margin)
+    own = [pair for pair in map(tuple, solids.own.tolist()) if pair not in never]
+    blocks = blocks_of(solids, robot, np.vstack((solids.furniture, pairs_of(own))), margin)
+    _kept[solids] = ref(robot), margin, blocks
+    return blocks
 
 
 def checked_clearance(

@@ -36,6 +36,7 @@ def docstrings() -> list[tuple[str, str, list[str]]]:
     return found
 
 
+@pytest.mark.slow
 def test_every_public_name_has_a_place(tmp_path: Path) -> None:
     """What `import qpsafe` offers has a page each; what any other module has stands on its package's page."""
     api.write(tmp_path)
@@ -53,6 +54,7 @@ def test_what_is_exported_is_where_the_catalogue_says() -> None:
         assert name in {item.name for item in modules()[module].names}, f"{name} is not defined in {module}"
 
 
+@pytest.mark.slow
 def test_names_of_the_project_in_docstrings_exist() -> None:
     """A dotted name that begins with `qpsafe.` leads somewhere; a moved module is noticed here."""
     dead: list[tuple[str, str]] = []
@@ -63,6 +65,7 @@ def test_names_of_the_project_in_docstrings_exist() -> None:
     assert dead == []
 
 
+@pytest.mark.slow
 def test_no_docstring_has_links_of_another_tool() -> None:
     assert [
         place for place, text, _ in docstrings() if re.search(r"\]\[[\w.]*\]|:(?:class|func|meth|ref):`", text)

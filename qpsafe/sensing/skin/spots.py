@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import types
@@ -15,6 +17,7 @@ from qpsafe.compiled.compiled import Vector, entry, inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.sensing.skin.spot import Spot
 from qpsafe.sensing.skin.spot_file import read_spots
+from qpsafe.text.toml_parse import LARGEST
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -228,9 +231,20 @@ def detected_points(origins: Array, directions: Array, distances: Array) -> Arra
 
 
 def load_spots(robot: Robot) -> SpotArray | None:
-    """The robot's own spots from its `spots.toml`, or None if it has none.
+    """The robot's own spots from its `spots.toml`, or None if it has none; what has not changed is not parsed again.
 
     Raises:
         RobotFileError: The file is wrong, see `SpotArray.load`.
     """
-    return None if robot.spots_path is None else SpotArray.load(robot.spots_path, robot)
+    path = robot.spots_path
+    if path is None:
+        return None
+    with suppress(OSError, ValueError), path.open("rb") as file:  # what cannot be read is told by `load`
+        content = file.read(LARGEST + 1)
+        if robot not in _own or _own[robot][0] != content:
+            _own[robot] = content, SpotArray.load(path, robot)
+        return _own[robot][1]
+    return SpotArray.load(path, robot)
+
+
+_own: WeakKeyDictionary[Robot, tuple[bytes, SpotArray]] = WeakKeyDictionary()

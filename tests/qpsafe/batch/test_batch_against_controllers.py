@@ -39,7 +39,7 @@ def program(robot: Any, cycle: bool) -> Program:
     return Program([Line(a, b), Dwell(b, 0.1), Line(b, c), Line(c, a)], [(1, "grip"), (2, "go"), (3, "drop")], cycle)
 
 
-@pytest.mark.parametrize(("name", "count"), first(2, [("irb140", 2), ("irb14000", 2), ("irb140", 1), ("iiwa14", 2)]))
+@pytest.mark.parametrize(("name", "count"), first(1, [("irb140", 2), ("irb14000", 2), ("irb140", 1), ("iiwa14", 2)]))
 def test_fixed_poses_give_the_same_bits(pairs: Any, come: Any, name: str, count: int) -> None:
     """Robots of 6, 7 and 14 joints; a few are told what is no point, or no measurement, now and then."""
     robot = qpsafe.load_robot(name)
@@ -86,6 +86,7 @@ class Circle:
         return qpsafe.tasks.program.Event(k + 0.5, f"lap {k}")
 
 
+@pytest.mark.slow
 def test_paths_that_tell_no_end_are_looked_at_as_far_as_need_be(pairs: Any, come: Any, irb140: Any) -> None:
     path = Circle(irb140.pose("tcp", irb140.home))
     tasks = [qpsafe.FrameTask("tcp", path, 10.0, rows=(0, 1, 2, 5))]
@@ -141,7 +142,7 @@ def test_goals_out_of_reach_are_told_and_taken_back(pairs: Any, come: Any, irb14
     assert told == {(), ("held: it moved without getting nearer to its goals",)}
 
 
-@settings(max_examples=some(5, of=12), deadline=None)
+@settings(max_examples=some(3, of=12), deadline=None)
 @given(st.data())
 def test_any_plain_parts_give_the_same_bits(pairs: Any, come: Any, irb140: Any, data: Any) -> None:
     """Rows, gains, thresholds, rules, admittance, limits and sensing as they come."""
@@ -217,7 +218,7 @@ def test_a_way_back_that_limits_block_goes_through_the_joints(pairs: Any, irb140
     assert [controller.recovery.phase for controller in loop.controllers] == ["following"] * 2
 
 
-@pytest.mark.parametrize(("name", "law"), first(2, [
+@pytest.mark.parametrize(("name", "law"), first(1, [
     ("irb14000", None), ("iiwa14", qpsafe.HierarchicalLaw("paper")), ("irb140", None), ("irb140", qpsafe.WeightedLaw()),
 ]))  # fmt: skip
 def test_rows_that_keep_clear_give_the_same_bits(pairs: Any, come: Any, name: str, law: Any) -> None:

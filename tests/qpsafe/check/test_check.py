@@ -52,6 +52,7 @@ def wrong(result):
     return names
 
 
+@pytest.mark.slow
 def test_bundled_programs_can_be_run_as_they_are_planned():
     for experiment in (PathExperiment(ROBOT), PickPlaceExperiment(ROBOT)):
         result = check_path(ROBOT, experiment.reference, known=known_obstacles(experiment.scene))
@@ -69,6 +70,7 @@ def test_robots_can_keep_their_home_pose(name):
     assert result.path.q == pytest.approx(robot.home[None])
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.integers(0, 10**6))
 def test_the_distance_is_coals_and_nothing_between_two_moments_is_nearer(seed):

@@ -69,6 +69,7 @@ def play_case(plan: Plan, case: Encounter, controller: str) -> dict[str, Any]:
     return row | told | {"distance_time": 20.0 * case.u[0]}
 
 
+@pytest.mark.slow
 def test_the_worst_cases_are_found_written_and_can_be_played_again(
     campaign: Campaign, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

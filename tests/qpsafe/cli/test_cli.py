@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import first
 from typer.testing import CliRunner
 
 from qpsafe import __version__
@@ -61,6 +60,7 @@ def test_demo_writes_report_figures_and_signals(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_demo_takes_other_sensors(tmp_path: Path) -> None:
     """A name in the robot's folder or a path; a run keeps which; they fit one robot."""
     quick = ["demo", "fixed", "--duration", "0.1", "--no-video", "--out", str(tmp_path / "a")]
@@ -72,7 +72,8 @@ def test_demo_takes_other_sensors(tmp_path: Path) -> None:
         assert isinstance(run(app, [*quick, *wrong]).exception, QpsafeError)
 
 
-@pytest.mark.parametrize("sensor", first(1, ["ideal+depth", "vl53l5cx"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("sensor", ["ideal+depth", "vl53l5cx"])
 def test_demo_takes_sensors_of_many_zones(sensor: str, tmp_path: Path) -> None:
     """The report says which; the run is replayed bit by bit, its images made again."""
     quick = ["demo", "fixed", "--duration", "0.4", "--no-video", "--out", str(tmp_path / "a")]
@@ -91,6 +92,7 @@ def test_demo_refuses_other_sensors_before_anything_runs(sensor: str, tmp_path: 
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_demo_without_opengl_says_so_in_one_line(without_display: Callable[..., Any], tmp_path: Path) -> None:
     done = without_display("demo", "fixed", "--duration", "0.2", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
@@ -213,6 +215,7 @@ def test_bench_writes_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert content["engine"]["ratio"] == 40.0
 
 
+@pytest.mark.slow
 def test_robots_add_writes_a_file_that_loads_and_never_over_another(tmp_path: Path) -> None:
     import shutil
 

@@ -61,6 +61,7 @@ def test_a_placement_is_written_and_loads(tmp_path: Path) -> None:
         assert all(a <= p <= b for a, p, b in zip(low, curve["probability"][1], high, strict=True))
 
 
+@pytest.mark.slow
 def test_arrays_are_placed_and_load(tmp_path: Path) -> None:
     result = run("--sensor", "vl53l5cx", "--objective", "nearest", "--spots", "6", "--json", "--out", str(tmp_path))
     assert result.exit_code == 0, result.output

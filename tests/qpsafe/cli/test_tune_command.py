@@ -14,7 +14,6 @@ import made_up_trials
 import made_up_values
 import numpy as np
 import pytest
-from amounts import first
 from typer.testing import CliRunner
 
 import qpsafe
@@ -71,7 +70,8 @@ def test_a_search_is_kept_judged_reported_and_printed(tmp_path: Path) -> None:
     assert json.loads(again.stdout) == said
 
 
-@pytest.mark.parametrize("share", first(1, [0.97, 0.7]))  # in the search, in the finals
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.97, 0.7])  # in the search, in the finals
 def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
     monkeypatch: pytest.MonkeyPatch, share: float
 ) -> None:
@@ -113,6 +113,7 @@ def test_values_are_written_into_a_robot_of_ones_own_and_only_there(tmp_path: Pa
     assert "--write" in str(refused.exception)
 
 
+@pytest.mark.slow
 def test_what_is_not_better_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: made_up_trials.run)
     shutil.copytree(qpsafe.load_robot("irb140").folder, tmp_path / "own")
@@ -123,6 +124,7 @@ def test_what_is_not_better_is_not_written(tmp_path: Path, monkeypatch: pytest.M
     assert (tmp_path / "own" / "robot.toml").read_text(encoding="utf-8") == text
 
 
+@pytest.mark.slow
 def test_without_finals_the_search_chooses() -> None:
     said = json.loads(tune(*FEW, "--finals", "0", "--out", "x", "--json").stdout)
     assert said["finals"] is None

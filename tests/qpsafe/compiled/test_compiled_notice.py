@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 KERNEL = """
 from numba import types
 from qpsafe.compiled.compiled import entry
@@ -36,6 +38,7 @@ def start(folder: Path, setting: str) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 def test_it_says_compiling_if_and_only_if_something_compiles_for_long(tmp_path: Path) -> None:
     (tmp_path / "kernel.py").write_text(KERNEL)
     assert start(tmp_path, BUSY).count("compiling for this machine") == 1

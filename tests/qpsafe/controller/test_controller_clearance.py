@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first
 from clearance_runs import MARGIN, NOBODY, controller_at, distances, kept, run, tasks_at
 
 import qpsafe
@@ -17,7 +18,7 @@ from qpsafe.tasks.program import Program
 from qpsafe.tasks.rotation import exp3
 
 
-@pytest.mark.parametrize("name", qpsafe.bundled_robots())
+@pytest.mark.parametrize("name", first(1, qpsafe.bundled_robots()))
 def test_tasks_that_lead_into_things_do_not_touch_them(name: str) -> None:
     """Goals at random, half a metre away in an instant; without rows the same tasks do touch. Speeds are such that the
     arm turns by a lot while it brakes, which is what the millimetre is for."""

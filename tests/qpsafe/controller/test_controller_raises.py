@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -270,7 +271,7 @@ def test_an_error_of_tasks_off_their_path_is_told_as_it_was(run: Any, irb140: An
             assert np.linalg.norm(tick.errors[0]) < 0.4
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(15, of=40), deadline=None)
 @given(
     st.lists(st.integers(0, 12), min_size=1, max_size=6),
     st.lists(st.tuples(st.integers(0, 14), st.sampled_from(["away and back", "a copy", "another", "the same"]))),

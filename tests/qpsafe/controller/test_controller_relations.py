@@ -66,7 +66,7 @@ def test_reset_forgets_held_points(run: Any) -> None:
 @pytest.mark.parametrize("key", LAWS)
 def test_the_order_of_points_does_not_matter(run: Any, irb140: Any, key: str) -> None:
     rng = np.random.default_rng(5)
-    for points in wandering(irb140, some(20, of=60), 8, seed=2):
+    for points in wandering(irb140, some(10, of=60), 8, seed=2):
         q = irb140.home + rng.uniform(-0.3, 0.3, irb140.nq)
         qd = rng.uniform(-0.3, 0.3, irb140.nq)
         here = run(LAWS[key](), q=q).feed(q, qd, points=points)

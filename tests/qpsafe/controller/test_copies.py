@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first
 
 import qpsafe
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
@@ -41,7 +42,7 @@ def ticks(it: qpsafe.SafetyController, q: np.ndarray, first: int, last: int) -> 
     return found
 
 
-@pytest.mark.parametrize("barrier", BARRIERS)
+@pytest.mark.parametrize("barrier", first(1, BARRIERS))
 @pytest.mark.parametrize("way", WAYS)
 def test_a_copied_controller_goes_on_by_itself(irb140: Any, way: str, barrier: str) -> None:
     whole = controller(irb140, BARRIERS[barrier])

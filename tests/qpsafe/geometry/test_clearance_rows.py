@@ -215,3 +215,13 @@ def test_what_is_near_at_home_may_come_half_as_near(made: Any) -> None:
     assert home < 0.05
     level = limit.level(robot.at(robot.home), np.zeros(robot.nq), JointLimits.of(robot))
     assert level is None or (level.upper >= 0.0).all()
+
+
+def test_controllers_of_a_cell_share_its_tables_and_nobody_gets_anothers(made: Any) -> None:
+    robot, solids = made
+    other = qpsafe.load_robot(robot.name)
+    for margin in (0.004, 0.1, 0.004):
+        limit, again = ClearanceLimit(robot, solids, margin), ClearanceLimit(robot, solids, margin)
+        assert again.blocks is limit.blocks
+        fresh = ClearanceLimit(other, Solids.of(other, [FLOOR, POST]), margin)
+        assert all(np.array_equal(a, b) for a, b in zip(limit.blocks, fresh.blocks, strict=True))

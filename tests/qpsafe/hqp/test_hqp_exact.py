@@ -84,6 +84,7 @@ def test_inequalities_above_inequalities():
         np.testing.assert_allclose(solution.qd, expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_many_joints_and_rows():
     rng = np.random.default_rng(6)
     for n, rows in ((12, 20), (20, 8), (30, 40)):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hqp_intervals as family
 import numpy as np
 import pytest
-from amounts import some
+from amounts import first, some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 
-examples = settings(max_examples=60, deadline=None)
+examples = settings(max_examples=some(20, of=60), deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 
 #: Seeds of the family whose rows are crossed whole, then left at a vertex: found by search, one in 5,000 is like them.
@@ -57,7 +57,7 @@ def test_equals_the_exact_solution_many_times():
     assert family.judge(20_000, seed=13)["own"] == {"right": 20_000}
 
 
-@pytest.mark.parametrize(("solver", "least"), [("daqp", 60), ("proxqp", 140), ("qpsolvers:daqp", 140)])
+@pytest.mark.parametrize(("solver", "least"), first(1, [("daqp", 60), ("proxqp", 140), ("qpsolvers:daqp", 140)]))
 def test_back_ends_are_right_or_hand_over_to_the_own_solver(solver, least):
     found = family.judge(150, seed=7, solvers=(solver,))[solver]
     assert found["right"] + found["handed over"] == 150

@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -28,7 +29,7 @@ def test_round_trip_to_the_bit(values: np.ndarray, aged: bool, seq: int, time: f
     assert found.ages is None or found.ages.tobytes() == values[::-1].tobytes()
 
 
-@settings(max_examples=300)
+@settings(max_examples=some(100, of=300))
 @given(st.binary(max_size=400), st.integers(0, 300), st.integers(1, 255))
 def test_junk_is_nothing(junk: bytes, at: int, flip: int) -> None:
     assert decode(junk, 20) is None or junk[:4] == b"QPSD"
@@ -107,7 +108,7 @@ def test_an_address_in_use_is_named(wire) -> None:
         SensorInput(3, port=wire[0].address[1])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(20, of=60), deadline=None)
 @given(
     st.lists(st.floats(-1e6, 1e6) | st.floats(-0.1, 0.1) | st.just(float("nan")), min_size=3, max_size=3),
     st.floats(0.06, 30.0),

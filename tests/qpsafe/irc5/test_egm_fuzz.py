@@ -10,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -31,13 +32,13 @@ def load(name: str) -> ModuleType:
 fuzz_egm = load("fuzz_egm")
 
 
-@settings(max_examples=300)
+@settings(max_examples=some(100, of=300))
 @given(data=st.binary(max_size=300))
 def test_any_bytes(data: bytes) -> None:
     fuzz_egm.Target().check(data)
 
 
-@settings(max_examples=300)
+@settings(max_examples=some(100, of=300))
 @given(data=st.data())
 def test_valid_packets_with_some_bytes_changed(data: st.DataObject) -> None:
     target = fuzz_egm.Target()
@@ -48,7 +49,7 @@ def test_valid_packets_with_some_bytes_changed(data: st.DataObject) -> None:
     target.check(bytes(packet[: data.draw(st.integers(0, len(packet)))]))
 
 
-@settings(max_examples=200)
+@settings(max_examples=some(66, of=200))
 @given(data=st.binary(max_size=200))
 def test_a_simulated_robot_survives_any_answer(data: bytes) -> None:
     try:

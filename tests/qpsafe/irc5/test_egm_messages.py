@@ -209,6 +209,7 @@ def test_our_messages_load_beside_those_of_others(peer: str) -> None:
         subprocess.run([sys.executable, "-c", f"import {order}"], check=True, timeout=60, capture_output=True)
 
 
+@pytest.mark.slow
 def test_only_irc5_needs_protobuf() -> None:
     code = "import sys, qpsafe, qpsafe.controller, qpsafe.reference; print('google.protobuf' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], check=True, timeout=120, capture_output=True, text=True)

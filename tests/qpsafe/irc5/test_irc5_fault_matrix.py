@@ -50,6 +50,7 @@ def test_some_faults_at_one_moment() -> None:
     assert [result.case for result in results if not result.kept] == []
 
 
+@pytest.mark.slow
 def test_the_matrix_sees_a_broken_streamer(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that drives the robot whatever its states are, and one that raises."""
     cases = [case for case in CASES if case.name == "motors off for 0.4 s"]
@@ -67,6 +68,7 @@ def test_the_matrix_sees_a_broken_streamer(monkeypatch: pytest.MonkeyPatch) -> N
     assert "on fire" in result.errors[0]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="processes that inherit the work")
 def test_a_worker_that_dies_is_told_and_the_moments_agree_with_those_of_one_process() -> None:
     (case,) = (case for case in CASES if case.name == "Ctrl-C")

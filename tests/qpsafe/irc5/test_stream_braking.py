@@ -255,7 +255,7 @@ def test_a_stream_that_is_to_end_does_not_wait_long_for_a_robot_that_has_gone(si
 
 
 @given(st.floats(0.05, 5.0), st.integers(1, 300))
-@settings(max_examples=some(15, of=60))
+@settings(max_examples=some(6, of=60))
 def test_a_robot_is_held_if_and_only_if_it_was_silent_for_longer_than_is_borne(silence: float, passes: int) -> None:
     """Within it the stream goes on as if nothing had been; also where a session by itself would see a new start."""
     assume(abs(0.02 * passes - silence) > 0.03)

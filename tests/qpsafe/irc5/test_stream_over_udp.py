@@ -35,6 +35,7 @@ from qpsafe.sim.irc5.udp import NoAnswerError, UdpExchange
 PROGRAM = [sys.executable, "-c", "from qpsafe.cli.main import main; main()"]
 
 
+@pytest.mark.slow
 def test_over_the_wire_as_in_one_process(tmp_path: Path) -> None:
     """In lock-step, to the bit: the wire loses nothing of any number."""
     robot, settings = load_robot("irb140"), EgmSettings()

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -112,7 +113,7 @@ class Stream(RuleBasedStateMachine):
 
 
 TestStream = Stream.TestCase
-TestStream.settings = settings(max_examples=120, stateful_step_count=30, deadline=None)
+TestStream.settings = settings(max_examples=some(40, of=120), stateful_step_count=30, deadline=None)
 
 
 def test_no_event_but_acknowledgement_leads_back() -> None:
@@ -152,7 +153,7 @@ def test_the_log_is_bounded_and_a_repeated_cause_is_logged_once() -> None:
     st.lists(st.floats(0.0, 1e6, allow_subnormal=False), min_size=2, max_size=60),
     st.sampled_from(["joint_2 is {} rad from what it was sent", "law: <object at 0x{:x}> failed after {:.3f} s"]),
 )
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=some(16, of=50), deadline=None)
 def test_a_cause_whose_figures_change_is_one_cause_and_one_line(figures: list[float], words: str) -> None:
     supervisor = Supervisor()
     supervisor.seed("ready")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
@@ -93,7 +94,7 @@ def test_orthogonal_tasks_make_both_projections_equal(projection: str) -> None:
     assert HierarchicalLaw(projection).solve(problem).qd == pytest.approx(NullspaceLaw().solve(problem).qd, abs=1e-8)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(15, of=40), deadline=None)
 @given(state, unit, unit, st.floats(0.05, 2.0), st.sampled_from(("strict", "paper")))
 def test_limits_hold_for_every_blend(s, m: float, f: float, bound: float, projection) -> None:
     result = HierarchicalLaw(projection).solve(s._replace(m=m, f=f).problem(bound))

@@ -173,6 +173,7 @@ def test_a_model_with_more_than_the_robot_gives_the_robot_the_same_velocity(robo
     np.testing.assert_allclose(whole[6:], alone.solve(alone.at(robot.home), [*tasks, damping], [limit]), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_pink_is_optional():
     code = (
         "import sys; sys.modules['pink'] = None\n"

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -283,7 +284,7 @@ def test_an_event_waits_until_the_tasks_are_met() -> None:
         max_size=30,
     )
 )
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=some(20, of=60))
 def test_no_event_is_lost_or_doubled_and_the_clock_never_goes_back(spells: list) -> None:
     """Whatever danger, pauses and evasion do: the events are 0, 1, 2 ... up to where the path is."""
     world, last = World(), 0.0

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first
 
 import qpsafe
 from qpsafe.tasks.moves import Line, Rates
@@ -48,6 +49,7 @@ def comes_home_or_says_why_not(run: Any, robot: Any, seed: int) -> bool:
     return bool(home)
 
 
+@pytest.mark.slow
 def test_a_way_back_that_limits_block_goes_through_the_joints(run: Any, irb140: Any) -> None:
     assert comes_home_or_says_why_not(run, irb140, 1)
 
@@ -103,7 +105,7 @@ def test_the_way_through_the_joints_ends_at_its_posture_and_then_on_the_path(run
     assert max(np.linalg.norm(e) for e in tick.errors) < 5e-4
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
+@pytest.mark.parametrize("seed", first(1, range(4)))
 def test_goals_out_of_reach_are_named_and_the_robot_stands(run: Any, irb140: Any, seed: int) -> None:
     """Anywhere, from just beyond the reach to 5 m away, in any orientation."""
     rng = np.random.default_rng(seed)
@@ -122,6 +124,7 @@ def test_goals_out_of_reach_are_named_and_the_robot_stands(run: Any, irb140: Any
         assert (f"{name} at its upper limit" in tick.messages[0]) == high
 
 
+@pytest.mark.slow
 def test_a_line_out_of_reach_is_named_on_the_way(run: Any, irb140: Any) -> None:
     start = irb140.pose("tcp", irb140.home)
     goal = start.copy()
@@ -150,6 +153,7 @@ def test_what_is_explained_is_not_said(run: Any, irb140: Any, seed: int) -> None
     assert max(np.linalg.norm(e) for e in tick.errors) < 1e-3
 
 
+@pytest.mark.slow
 def test_what_was_said_is_taken_back_when_the_goal_changes(run: Any, irb140: Any) -> None:
     """And the robot comes back from where it got to, though a limit blocks the straight way."""
     far = irb140.pose("tcp", irb140.home)

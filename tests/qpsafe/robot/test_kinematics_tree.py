@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -66,7 +67,7 @@ def check(model: Any, ends: tuple[int, ...], q: np.ndarray, qd: np.ndarray) -> N
         np.testing.assert_allclose(parts[3, -1 - k], parts[2, k], **TOLERANCE)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(20, of=60), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 16))
 def test_random_trees(seed: int, n: int) -> None:
     pin.seed(seed % 2**31)

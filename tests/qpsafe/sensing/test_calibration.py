@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -35,7 +35,7 @@ def test_exact_pairs_give_the_curve_back(curve: SharpCurve) -> None:
     assert fit.curve.distance(curve.voltage(d)) == pytest.approx(d, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", first(1, range(3)))
 def test_noisy_simulated_sensors_are_read_within_1_cm(seed: int) -> None:
     """The issue's promise: 20 units, each identified from 13 noisy pairs, then 20-80 cm read with 95 % within 1 cm."""
     names = tuple(f"spot {i}" for i in range(20))
@@ -82,7 +82,7 @@ def test_wrong_pairs_are_found_and_forgiven_up_to_a_tenth(n: int, seed: int, off
 
 
 @pytest.mark.parametrize("end", [0, -1])
-@pytest.mark.parametrize("off", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("off", first(1, [0.5, 1.0, 1.5]))
 def test_a_wrong_pair_at_an_end_does_not_bend_the_curve_to_itself(end: int, off: float) -> None:
     for seed in range(some(6, of=20)):
         curve, d = SharpCurve(0.72, 0.09, 0.02), np.linspace(0.2, 0.8, 10)

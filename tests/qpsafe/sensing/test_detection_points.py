@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -26,7 +27,7 @@ def distance_to_link(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> f
     return float(np.linalg.norm(np.cross(point - start, d)) / np.linalg.norm(d))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(20, of=60), deadline=None)
 @given(hnp.arrays(np.float64, (4, 3), elements=coordinates), hnp.arrays(np.float64, (6,), elements=coordinates))
 def test_no_link_is_nearer_than_the_one_that_is_named(irb140: Any, points: np.ndarray, q: np.ndarray) -> None:
     wire = irb140.wire(q, np.zeros(6))
@@ -37,7 +38,7 @@ def test_no_link_is_nearer_than_the_one_that_is_named(irb140: Any, points: np.nd
         assert all(d > min(distances) for d in distances[:link])  # the first of the nearest
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(20, of=60), deadline=None)
 @given(
     hnp.arrays(np.float64, (8, 3), elements=coordinates),
     hnp.arrays(np.float64, (6,), elements=coordinates),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -54,7 +55,7 @@ def files(draw: Any) -> tuple[list[tuple[str, float, float]], str, str, str]:
     return pairs, head + out.getvalue(), code, delimiter
 
 
-@settings(max_examples=80)
+@settings(max_examples=some(26, of=80))
 @given(files())
 def test_what_was_meant_is_read(tmp_path_factory: Any, file: Any) -> None:
     pairs, text, code, _ = file
@@ -65,7 +66,7 @@ def test_what_was_meant_is_read(tmp_path_factory: Any, file: Any) -> None:
     assert [numbers for _, *numbers in found] == [pytest.approx(numbers, abs=1e-9) for _, *numbers in pairs]
 
 
-@settings(max_examples=80)
+@settings(max_examples=some(26, of=80))
 @given(files(), st.data())
 def test_what_is_damaged_is_read_or_refused_by_name(tmp_path_factory: Any, file: Any, data: Any) -> None:
     _, text, code, _ = file

@@ -6,6 +6,7 @@ from typing import Any
 import coal
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +27,7 @@ def inside(obstacle: Obstacle, point: np.ndarray, tolerance: float) -> bool:
     return bool(hulls.find(point[None], np.array([tolerance]), WORLD)[0] == 0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=some(33, of=100), deadline=None)
 @given(st.integers(0, 2**32 - 1), vector, st.floats(0.0, 0.1))
 def test_a_hull_agrees_with_coal(seed: int, point: np.ndarray, tolerance: float) -> None:
     """Inside is inside; within the tolerance is inside; more than √3 tolerances away from its box is not."""

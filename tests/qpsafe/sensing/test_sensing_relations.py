@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -115,7 +116,7 @@ def test_other_units_in_the_robots_file_change_nothing(irb140: Any, tmp_path: An
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(15, of=40), deadline=None)
 @given(poses, poses, readings, st.integers(0, 19), st.floats(0.2, 0.8))
 def test_one_more_thing_in_sight_never_lowers_the_danger(
     irb140: Any, q: np.ndarray, qd: np.ndarray, d: np.ndarray, spot: int, nearer: float

@@ -1,6 +1,7 @@
 """Spots: eq. (7) against the chain of homogeneous matrices, mistakes in spots.toml, and the IRB 140's own twenty."""
 
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import qpsafe
+from qpsafe.errors import RobotFileError
 
 # ABB's published table for the IRB 140: theta offset [deg], d [m], a [m], alpha [deg]
 TABLE = [(0, 0.352, 0.07, -90), (-90, 0, 0.36, 0), (0, 0, 0, -90), (0, 0.38, 0, 90), (0, 0, 0, -90), (180, 0.065, 0, 0)]
@@ -275,3 +277,24 @@ def test_optimised_spots_keep_to_what_the_regions_say(irb140: Any) -> None:
         assert len(inside) <= region.at_most, region.name
         assert {int(spots.links[spots.names.index(name)]) for name in inside} <= {region.link}
     assert spots.links.max() == 3
+
+
+def test_spots_are_those_that_stand_in_the_file_now(tmp_path: Path) -> None:
+    """What has not changed is not parsed again; what has, in whatever way, counts at once, and counts back again."""
+    folder = shutil.copytree(qpsafe.load_robot("irb140").folder, tmp_path / "arm")
+    robot, file = qpsafe.load_robot(folder), folder / "spots.toml"
+    text = file.read_text(encoding="utf-8")
+    spots = qpsafe.load_spots(robot)
+    assert spots is qpsafe.load_spots(robot)
+    for name in ("a1", "b2"):  # of the same length, within the same tick of the clock
+        file.write_text(text.replace(spots.names[0], name), encoding="utf-8")
+        assert qpsafe.load_spots(robot).names[0] == name
+    for spoilt in ("x", text.replace("link = 1", "link = 99")):
+        file.write_text(spoilt, encoding="utf-8")
+        with pytest.raises(RobotFileError):
+            qpsafe.load_spots(robot)
+    file.unlink()
+    with pytest.raises(RobotFileError):
+        qpsafe.load_spots(robot)
+    file.write_text(text, encoding="utf-8")
+    assert qpsafe.load_spots(robot).names == spots.names

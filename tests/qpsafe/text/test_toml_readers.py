@@ -197,7 +197,7 @@ documents = st.lists(
 ).map("\n".join)
 
 
-@settings(ANY, max_examples=40)
+@settings(ANY, max_examples=some(15, of=40))
 @given(documents | st.text(max_size=60) | st.binary(max_size=60), st.sampled_from(list(READERS)))
 def test_a_generated_document_is_read_or_refused_by_name(tmp_path_factory: Any, text: str | bytes, kind: str) -> None:
     outcome(kind, text, tmp_path_factory.getbasetemp())

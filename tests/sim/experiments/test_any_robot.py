@@ -32,7 +32,7 @@ from qpsafe.sim.world.tool_axis import tool_axis
 from qpsafe.tasks.program_file import parse_program
 
 
-@pytest.fixture(scope="module", params=["SIX", "SEVEN"])
+@pytest.fixture(scope="module", params=["SEVEN", pytest.param("SIX", marks=pytest.mark.slow)])
 def ready(request: pytest.FixtureRequest, arms: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A bare URDF made ready, and the folder."""
     folder = tmp_path_factory.mktemp("ready")
@@ -181,6 +181,7 @@ def test_four_joints_are_enough_to_hold_a_pose(arms: Any, tmp_path: Path) -> Non
     assert set(FixedExperiment(made.robot, duration=0.1).run().status) == {"ok"}
 
 
+@pytest.mark.slow
 def test_only_the_listed_robots_promise_what_was_tuned_for_them(arms: Any, tmp_path: Path) -> None:
     """The order of Table I and how far a tool turns are shown for others; everything else still counts."""
     from qpsafe.sim.experiments.fixed.stage import robot_stage

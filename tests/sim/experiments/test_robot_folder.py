@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amounts import first
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -64,7 +65,7 @@ def described(file: Path) -> Robot:
     return load_quietly(file.parent)
 
 
-@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("mesh", first(1, MESHES))
 def test_a_tuned_copy_finds_its_meshes_wherever_it_is(mesh: str, tmp_path: Path) -> None:
     robot = described(package(tmp_path / "ws", mesh))
     values = Space.of(robot).at(Space.of(robot).near(np.random.default_rng(0), 0.2))
@@ -87,6 +88,7 @@ def test_of_a_bundled_robot_everything_is_copied(name: str, tmp_path: Path) -> N
     assert load_quietly(folder).model_path.parent == folder
 
 
+@pytest.mark.slow
 def test_sensors_of_another_kind_and_meshes_of_regions_go_along(tmp_path: Path) -> None:
     robot = described(package(tmp_path, MESHES[1]))
     (robot.folder / "spots-vl53l5cx.toml").write_text("# arrays\n")
@@ -114,7 +116,7 @@ def test_nothing_of_anybody_elses_is_deleted(bundled: bool, tmp_path: Path) -> N
     assert (place / "spots-by-hand.toml").exists() == (robot.folder / "spots-by-hand.toml").exists()
 
 
-@pytest.mark.parametrize("up", [0, 1])
+@pytest.mark.parametrize("up", first(1, [0, 1]))
 def test_a_copy_over_the_robot_itself_is_refused_and_leaves_it_as_it_is(up: int, tmp_path: Path) -> None:
     robot = described(package(tmp_path, MESHES[1]))
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -193,7 +194,7 @@ def test_a_good_wire_changes_nothing() -> None:
     st.floats(0.0, 1.0),
     st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=50)
+@settings(max_examples=some(16, of=50))
 def test_what_goes_in_comes_out_or_is_counted(
     loss: float, delay: float, reorder: float, duplicate: float, seed: int
 ) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -91,7 +91,7 @@ def test_nobody_sinks_into_the_floor():
     assert lowest >= NOMINAL.person.floor - 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=some(15, of=40))
 @given(st.floats(0.0, 60.0))
 def test_board_distance_is_the_horizontal_distance_to_the_face(t):
     pose = NOMINAL.pose(t)

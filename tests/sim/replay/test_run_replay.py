@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import some
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +90,7 @@ def test_replay_gives_every_bit_again(run: RunFile) -> None:
 
 @given(st.integers(0, TICKS - 1), st.integers(0, 5), st.integers(0, 63), st.sampled_from(["q_ref", "qd_ref"]))
 @example(k=0, joint=1, bit=63, name="qd_ref")  # 0.0 becomes -0.0
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=some(1, of=3), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_one_flipped_bit_of_an_answer_is_found_with_its_tick(run: RunFile, k, joint, bit, name) -> None:
     flipped = run.arrays[name].copy()
     flipped.view(np.uint64)[k, joint] ^= np.uint64(1 << bit)
@@ -120,6 +120,7 @@ def test_other_words_and_messages_are_found(run: RunFile) -> None:
     assert (found.first.tick, found.first.what) == (11, "messages")
 
 
+@pytest.mark.slow
 def test_other_versions_and_robot_files_are_named(run: RunFile) -> None:
     versions = {**run.header["versions"], "numpy": "1.2.3"}
     found = replay(replace(run, header={**run.header, "versions": versions, "robot_files": "0"}))
@@ -250,7 +251,8 @@ def test_settings_survive_json(experiment: FixedExperiment) -> None:
         assert np.array_equal(experiment.reference.sample(t).pose, again.reference.sample(t).pose)
 
 
-@pytest.mark.parametrize("people", first(1, [PEOPLE, None]))
+@pytest.mark.slow
+@pytest.mark.parametrize("people", [PEOPLE, None])
 def test_the_third_experiment_is_recorded_and_replayed_too(tmp_path: Path, people: Path | None) -> None:
     experiment = PickPlaceExperiment(ROBOT, people_file=people, seed=3, limit=0.4)
     states = StateRecorder()

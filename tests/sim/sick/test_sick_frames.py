@@ -45,6 +45,7 @@ def test_some_cases_react_as_promised() -> None:
     assert sum(result.applied for result in results) >= len(results) - 1
 
 
+@pytest.mark.slow
 def test_a_reaction_that_does_not_come_is_missed() -> None:
     """A healthy sensor is not named, and a dead one does not go on as if nothing were."""
     healthy, dead = (case for case in FRAME_CASES if case.name in ("one image blind", "silent, for good"))

@@ -23,6 +23,7 @@ BRIEF = Choreography(
 )
 
 
+@pytest.mark.slow
 def test_a_copy_goes_on_as_the_run_does_bit_by_bit():
     for sensor in ("ideal", "sharp"):
         loop = FixedLoop(FixedExperiment(ROBOT, sensor=sensor, choreography=BRIEF))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amounts import first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,7 @@ from qpsafe.sim.tuning.values import TABLES, present
 ROBOTS = ("irb140", "iiwa14", "irb14000")
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", first(1, ROBOTS))
 def test_what_is_written_loads_as_the_same_controller(name: str, tmp_path: Path) -> None:
     robot = qpsafe.load_robot(name)
     space = Space.of(robot)
@@ -67,7 +68,7 @@ KEYS = st.sampled_from(["delta", "mass", "calm"])
 VALUES = st.one_of(st.floats(0.001, 1e6), st.lists(st.floats(0.1, 9.0), min_size=1, max_size=4))
 
 
-@settings(max_examples=60)
+@settings(max_examples=some(20, of=60))
 @given(st.dictionaries(KEYS, VALUES, min_size=1), st.booleans())
 def test_an_edited_text_says_what_it_should_and_keeps_the_rest(values: dict[str, object], there: bool) -> None:
     text = 'name = "[danger]"  # [danger]\nlinks = [\n    ["a", "b"],\n    ["c"],\n]\n\n'

@@ -151,6 +151,7 @@ def test_a_furniture_contact_among_new_people_keeps_a_finalist_off_the_front(tmp
     assert len(met) > 1
 
 
+@pytest.mark.slow
 def test_luck_on_the_searchs_people_does_not_choose() -> None:
     """Where values change nothing but by luck, the search's best looks better than it is, and the finals tell."""
     lucky, true = [], []

@@ -37,6 +37,7 @@ def straight() -> list[Trial]:
     return run().trials
 
 
+@pytest.mark.slow
 def test_threads_two_processes_and_a_file_give_the_same_trials(straight: list[Trial], tmp_path: Path) -> None:
     with ThreadPoolExecutor(3) as executor:
         assert run(executor=executor).trials == straight

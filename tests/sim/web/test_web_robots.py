@@ -12,6 +12,7 @@ from qpsafe.cli.web import ready_robot
 from qpsafe.sim.web.setup import HOLD, NOBODY, Setup
 
 
+@pytest.mark.slow
 def test_a_bare_urdf_gets_sensors_and_a_name_stays_a_name(
     arms: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

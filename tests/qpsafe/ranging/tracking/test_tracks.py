@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -43,7 +44,7 @@ def rotation(rng: np.random.Generator) -> np.ndarray:
     return Q * np.sign(np.linalg.det(Q))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(15, of=40), deadline=None)
 @given(seeds, rates, st.sampled_from([0.002, 0.01, 0.02]), st.integers(1, 60))
 def test_what_rests_does_not_move(seed: int, rate: float, sigma: float, count: int) -> None:
     """Noise of three deviations is taken for none; of one or two points alone more than that is seen now and then."""
@@ -53,7 +54,7 @@ def test_what_rests_does_not_move(seed: int, rate: float, sigma: float, count: i
     assert np.mean(moving) <= (0.03 if count < 4 else 0.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(15, of=40), deadline=None)
 @given(seeds, rates, st.floats(0.5, 2.0))
 def test_a_constant_velocity_is_found(seed: int, rate: float, speed: float) -> None:
     """Within 0.5 m/s with a noise of 1 cm, 0.3 m/s on average, and never too fast: after four images, and a window.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amounts import first
 from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
@@ -20,7 +21,7 @@ from qpsafe.sim.tuning.robot_file import write_folder
 from qpsafe.sim.tuning.space import Space
 
 
-@pytest.mark.parametrize("name", ["irb140", "iiwa14"])
+@pytest.mark.parametrize("name", first(1, ["irb140", "iiwa14"]))
 @pytest.mark.parametrize("parameters", ["paper", "robot"])
 def test_parameters_are_those_that_were_asked_for(name: str, parameters: str, tmp_path: Path) -> None:
     space = Space.of(load_robot(name))
@@ -39,7 +40,7 @@ def test_parameters_are_those_that_were_asked_for(name: str, parameters: str, tm
     np.testing.assert_array_equal(again.run().q_ref, experiment.run().q_ref)
 
 
-@pytest.mark.parametrize("loaded", ["paper", "robot"])
+@pytest.mark.parametrize("loaded", first(1, ["paper", "robot"]))
 @pytest.mark.parametrize("parameters", [None, "paper", "robot"])
 def test_a_story_has_the_robots_own_unless_they_are_asked_for(parameters: str | None, loaded: str) -> None:
     robot = load_robot("irb140", parameters=loaded)

@@ -46,6 +46,7 @@ def test_the_run_has_every_regime_and_phase(strict: PathRun) -> None:
     assert strict.speed.max() == pytest.approx(0.1, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_orientation_error_vanishes_with_strict_and_stays_with_the_null_space_law(
     strict: PathRun, nullspace: PathRun
 ) -> None:
@@ -58,6 +59,7 @@ def test_the_line_is_kept_in_medium_danger(strict: PathRun) -> None:
     assert figures(strict, ROBOT).medium_position < 2e-3
 
 
+@pytest.mark.slow
 def test_no_joint_speed_jumps(strict: PathRun, without: PathRun, nullspace: PathRun) -> None:
     for run in (strict, without, nullspace):
         assert figures(run, ROBOT).step <= 1.0 + 1e-9
@@ -74,6 +76,7 @@ def test_the_path_goes_on_within_a_millimetre_of_where_it_stopped(strict: PathRu
     assert (np.diff(strict.origin, axis=0)[rest] == 0.0).all()
 
 
+@pytest.mark.slow
 def test_recovery_is_gentler_than_none(strict: PathRun, without: PathRun) -> None:
     recovered, pulled = figures(strict, ROBOT), figures(without, ROBOT)
     assert returning(strict).any()
@@ -84,6 +87,7 @@ def test_recovery_is_gentler_than_none(strict: PathRun, without: PathRun) -> Non
     assert recovered.smooth_acceleration < pulled.smooth_acceleration
 
 
+@pytest.mark.slow
 def test_the_report_names_what_is_not_kept(strict: PathRun, without: PathRun, nullspace: PathRun) -> None:
     found = {name: figures(run, ROBOT) for name, run in (("a", strict), ("b", without), ("c", nullspace))}
     checks, left_out = promises(found["a"], found["b"], {"nullspace": found["c"]})
@@ -109,6 +113,7 @@ def cut(run: PathRun, ticks: int) -> PathRun:
     return PathRun(type(run.log)(**parts), run.path_time[:ticks], run.speed[:ticks], run.origin[:ticks])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [2, 30, 250, *range(525, 2750, 150), 2750])
 def test_a_shorter_run_leaves_promises_out_and_breaks_none(
     strict: PathRun, without: PathRun, nullspace: PathRun, ticks: int

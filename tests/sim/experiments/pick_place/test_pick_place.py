@@ -49,6 +49,7 @@ def test_nothing_in_the_cell_is_danger(alone: PickRun) -> None:
     assert visits(alone) == []
 
 
+@pytest.mark.slow
 def test_equal_settings_give_equal_runs() -> None:
     """To the last bit, people and all."""
     first, second = (PickPlaceExperiment(ROBOT, seed=3, limit=1.0).run() for _ in range(2))
@@ -113,6 +114,7 @@ def test_people_vary_with_the_seed_and_can_reach_what_they_go_for() -> None:
     assert sides == {-1, 1}  # from both sides of the robot
 
 
+@pytest.mark.slow
 def test_runs_are_the_same_in_one_process_or_two() -> None:
     experiment = PickPlaceExperiment(ROBOT, limit=0.2)
     counted: list[int] = []
