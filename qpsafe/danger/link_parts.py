@@ -7,7 +7,8 @@ at right angles to n: the speed of approach is nᵀ J(a) q̇. J is linear betwee
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+
+class Gaps(NamedTuple):
+    """Some pairs of a part and a point, by part and then by point.
+
+    Attributes:
+        which: Their numbers: that of the part times the number of points, plus that of the point (r,).
+        distances: (r,) [m].
+        rows: nᵀ J(a), which times q̇ is the speed of approach (r, n).
+    """
+
+    which: Index
+    distances: Array
+    rows: Array
 
 
 class LinkParts(Fixed):
@@ -52,29 +67,34 @@ class LinkParts(Fixed):
             np.zeros(len(mountings)),
         )
 
-    def approaches(self, state: RobotState, points: Array) -> tuple[Array, Array]:
-        """Every part against every point: distances (c p,) [m] and rows (c p, n) that times q̇ are speeds of approach.
+    def gaps(self, state: RobotState, points: Array, most: Callable[[Array], Array] | None = None) -> Gaps:
+        """Pairs of a part and a point; a point on an axis has no direction from it: any one across the axis is taken.
 
-        A point on an axis has no direction from it: any one across the axis is taken.
+        Args:
+            state: The robot.
+            points: World frame (p, 3) [m].
+            most: Tells the distances from which on pairs are left out (c,) [m], from how fast each joint moves any
+                point of each part at most (c, n) [m/rad, 1]. All pairs count without it.
+        """
+        from qpsafe.danger.gaps_kernel import near_pairs  # compiled where it is used
+
+        places, jacobians = self.motion(state)
+        c, n = len(self.radii), jacobians.shape[-1]
+        far = np.full(c, np.inf) if most is None else most(np.sqrt((jacobians * jacobians).sum(axis=2)).max(axis=1))
+        room = c * len(points)
+        which, distances, rows = np.empty(room, dtype=np.int64), np.empty(room), np.empty((room, n))
+        count = near_pairs(places, jacobians, self.radii, points, far, which, distances, rows)
+        return Gaps(which[:count], distances[:count], rows[:count])
+
+    def approaches(self, state: RobotState, points: Array) -> tuple[Array, Array]:
+        """Distances (c p,) [m] and rows (c p, n) that times q̇ are speeds of approach, of every part and point.
 
         Args:
             state: The robot.
             points: World frame (p, 3) [m].
         """
-        places, jacobians = self.motion(state)
-        first, along = places[:, 0], places[:, 1] - places[:, 0]
-        off = points - first[:, None]  # (c, p, 3)
-        square = (along * along).sum(axis=1)
-        t = np.clip(np.einsum("cpk,ck->cp", off, along) / np.where(square > 0.0, square, 1.0)[:, None], 0.0, 1.0)
-        away = off - t[..., None] * along[:, None]
-        length = np.sqrt((away * away).sum(axis=-1))
-        on_axis = length < ON_AXIS
-        if on_axis.any():
-            away[on_axis] = np.broadcast_to(_across(along)[:, None], away.shape)[on_axis]
-        n = away / np.where(on_axis, 1.0, length)[..., None]
-        rows = (1.0 - t)[..., None] * np.einsum("cpk,ckj->cpj", n, jacobians[:, 0])
-        rows += t[..., None] * np.einsum("cpk,ckj->cpj", n, jacobians[:, 1])
-        return (length - self.radii[:, None]).ravel(), rows.reshape(-1, rows.shape[-1])
+        gaps = self.gaps(state, points)
+        return gaps.distances, gaps.rows
 
     def motion(self, state: RobotState) -> tuple[Array, Array]:
         """The ends of all axes in the world (c, 2, 3) [m], and their linear Jacobians (c, 2, 3, n)."""
@@ -84,17 +104,8 @@ class LinkParts(Fixed):
         turns, origins = poses[1:, :3, :3], poses[1:, :3, 3]
         v = (turns @ tree.axes[:, :3, None])[..., 0]
         w = (turns @ tree.axes[:, 3:, None])[..., 0]
-        moved = v + np.cross(w, places[:, :, None] - origins)  # of each end with each joint (c, 2, n, 3)
-        moved *= tree.supports[self.bodies][..., None]
-        return places, np.ascontiguousarray(np.swapaxes(moved, 2, 3))
-
-
-ON_AXIS = 1e-9  # a point nearer than that to an axis has no direction from it [m]
-
-
-def _across(along: Array) -> Array:
-    """Unit vectors at right angles to some vectors (c, 3)."""
-    other = np.eye(3)[np.abs(along).argmin(axis=1)]
-    across = np.cross(along, other)
-    size = np.linalg.norm(across, axis=1, keepdims=True)
-    return np.where(size > 0.0, across / np.where(size > 0.0, size, 1.0), other)
+        arm, on = places[:, :, None] - origins, tree.supports[self.bodies]  # (c, 2, n, 3), (c, 2, n)
+        moved = np.empty((*places.shape, len(v)))  # v + w × arm, of each end with each joint
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            moved[:, :, i] = on * (v[:, i] + w[:, j] * arm[..., k] - w[:, k] * arm[..., j])
+        return places, moved

@@ -61,9 +61,14 @@ class Separation:
         """S_p(0), the distance that even a robot at rest asks for [m]."""
         return self.person_speed * self.reaction_time + self.intrusion + self.person_error + self.robot_error
 
-    def distance(self, speed: ArrayLike) -> NDArray[np.float64]:
-        """S_p for speeds of the robot towards the person, any shape [m/s]; speeds below 0 count as 0 [m]."""
-        v, a_s, T_r = np.maximum(np.asarray(speed, dtype=float), 0.0), self.deceleration, self.reaction_time
+    def distance(self, speed: ArrayLike, held: float = 0.0) -> NDArray[np.float64]:
+        """S_p for speeds of the robot towards the person, any shape [m/s]; speeds below 0 count as 0 [m].
+
+        Args:
+            speed: Towards the person, any shape [m/s].
+            held: For how long it is kept before the stop can begin [s], see `speed`.
+        """
+        v, a_s, T_r = np.maximum(np.asarray(speed, dtype=float), 0.0), self.deceleration, self.reaction_time + held
         return self.standing + self.person_speed * v / a_s + v * T_r + v * v / (2.0 * a_s)
 
     def speed(self, distance: ArrayLike, held: float = 0.0) -> NDArray[np.float64]:

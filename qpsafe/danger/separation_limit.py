@@ -87,7 +87,8 @@ class SeparationLimit(Fixed):
             expected = "a Separation, e.g. Separation(deceleration=2.0)"
             raise ConfigurationError("SeparationLimit", "separation", separation, expected)
         self.separation = separation
-        import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
+        import qpsafe.danger.gaps_kernel
+        import qpsafe.hqp.own.solver  # noqa: F401  compile them now if need be, not within the first tick
 
     def __repr__(self) -> str:
         return call(self, self.separation)
@@ -118,20 +119,28 @@ class SeparationLimit(Fixed):
         count = len(parts.radii)
         if not len(points) or not count:
             return None
-        distances, A = parts.approaches(state, points)  # (c p,), (c p, n)
-        figures, held = self.separation, 0.0 if limits is None else limits.dt
-        upper = figures.speed(distances - max(figures.person_speed * age, come), held)
-        kept = np.isfinite(upper)
-        if limits is not None and qd is not None:
-            # the largest nᵀJ q̇ of any q̇ within a dt of the last one
-            kept &= A @ qd + np.abs(A) @ (limits.max_acceleration * limits.dt) > upper
-        rows = np.flatnonzero(kept)
-        if not len(rows):
+        figures, come = self.separation, max(self.separation.person_speed * age, come)
+        if limits is None or qd is None:
+            which, distances, A = parts.gaps(state, points)
+            upper = figures.speed(distances - come, 0.0 if limits is None else limits.dt)
+            kept = np.isfinite(upper)
+        else:  # the largest nᵀJ q̇ of any q̇ within a dt of the last one; who is farther than that asks for is left out
+            gained = limits.max_acceleration * limits.dt
+            fastest, dt = np.abs(qd) + gained, limits.dt
+            which, distances, A = parts.gaps(
+                state, points, lambda levers: (come + figures.distance(levers @ fastest, dt)) * (1.0 + 1e-9)
+            )
+            upper = figures.speed(distances - come, dt)
+            kept = np.isfinite(upper) & (A @ qd + np.abs(A) @ gained > upper)
+        if not kept.any():
             return None
-        rows, left = nearest_first(rows, rows // len(points), distances[rows], MOST)
+        rows, distances, A, upper = which[kept], distances[kept], A[kept], upper[kept]
+        chosen, left = nearest_first(np.arange(len(rows)), rows // len(points), distances, MOST)
         beyond = (A[left], upper[left]) if len(left) else None
+        if len(left):
+            rows, distances, A, upper = rows[chosen], distances[chosen], A[chosen], upper[chosen]
         names = tuple([parts.names[k // len(points)] for k in rows.tolist()])
-        return SeparationLevel(A[rows], upper[rows], names, rows % len(points), distances[rows], beyond)
+        return SeparationLevel(A, upper, names, rows % len(points), distances, beyond)
 
 
 def nearest_first(rows: Index, parts: Index, gaps: Array, most: int) -> tuple[Index, Index]:

@@ -319,3 +319,28 @@ def test_what_somebody_may_have_come_counts_as_distance(seed, come):
         figures = Separation(2.0, person_speed=v_h)
         level = SeparationLimit(figures).level(ROBOT.at(q), PARTS["irb140"], points, age, come=come)
         assert np.allclose(level.upper, figures.speed(level.gaps - max(v_h * age, come)), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@settings(max_examples=some(10, of=60))
+@given(st.integers(0, 10**6), st.sampled_from((0.05, 0.3, 2.0, 1e3, 1e7)))
+def test_of_many_points_no_row_that_can_bind_is_left_out(name, seed, spread):
+    """Pairs are left out early only where they are far from binding, wherever a cloud is."""
+    robot, parts, rng = ROBOTS[name], PARTS[name], np.random.default_rng(seed)
+    q, qd = some_state(robot, rng, share=rng.choice([0.0, 0.1, 1.0]))
+    points = robot.pose(robot.tool_frames[0], q)[:3, 3] + spread * rng.normal(size=(60, 3))
+    points[0], points[1] = np.inf, np.nan
+    here, limits, come = robot.at(q), JointLimits.of(robot, DT), float(rng.choice([0.0, 0.1]))
+    with np.errstate(invalid="ignore"):
+        distances, A = parts.approaches(here, points)
+        level = SeparationLimit(Separation(2.0)).level(here, parts, points, come=come, qd=qd, limits=limits)
+        upper = Separation(2.0).speed(distances - come, DT)
+        can = A @ qd + np.abs(A) @ (limits.max_acceleration * DT) > upper
+    chosen = np.flatnonzero(can & np.isfinite(upper))
+    assert (level is None) == (not len(chosen))
+    if level is not None:
+        left = np.empty(0) if level.beyond is None else level.beyond[1]
+        np.testing.assert_allclose(np.sort(np.append(level.upper, left)), np.sort(upper[chosen]), atol=1e-9)
+        if level.beyond is None:
+            np.testing.assert_allclose(level.A, A[chosen], atol=1e-12)
+            assert level.points.tolist() == (chosen % 60).tolist()
