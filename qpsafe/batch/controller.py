@@ -24,8 +24,8 @@ from qpsafe.text.words import call
 class BatchController:
     """n independent robots with the parts of one controller; what one does, or is told, never affects another.
 
-    Each robot's whole tick is compiled if the parts are plain: tasks on rows of a frame's pose, the strict hierarchical
-    law with the built-in solver, the built-in field, evasion, limits, activation and recovery rules, no barrier. The
+    Each robot's whole tick is compiled if the parts are plain: tasks on rows of a frame's pose, a built-in law with the
+    built-in solver, the built-in field, evasion, limits, activation and recovery rules, no barrier, no separation. The
     references are then those of as many `SafetyController`s: the same bits where trajectories are `FixedPose`s, else
     from knots that were checked against the trajectory (1e-10 m or rad). Other parts work the general way, by copies of
     the controller, more slowly; `why` says which part it is.

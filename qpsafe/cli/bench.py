@@ -32,7 +32,7 @@ def bench(
     if compile:
         _compilation(screen, out, json)
         return
-    screen.print("Warming up (the first time, compiling the kernels takes about half a minute) ...", style="dim")
+    screen.print("Warming up (the first time, compiling the kernels takes a minute or two) ...", style="dim")
     from qpsafe.bench.clock import machine, time_rows
     from qpsafe.bench.peers import MINK, PINK, mink_row, pink_row
     from qpsafe.bench.ticks import rows

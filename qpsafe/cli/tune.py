@@ -62,7 +62,8 @@ def tune(
     """Search for better parameters of the controller among people at random, and judge them by others.
 
     What is found is written to a copy of the robot's folder, with a report. The search goes on where it was stopped by
-    the same command. Exit code 1 if the values that were found are worse in something.
+    the same command. Exit code 1 if with the values found it touches furniture or itself more often than with the
+    present ones, or passes a joint limit; more harm or more work lost is in the report only.
     """
     screen = console(json)
     require("tune", WHERE, "optuna", "pyarrow")

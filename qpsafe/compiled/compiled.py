@@ -35,7 +35,7 @@ inline = numba.njit(no_cpython_wrapper=True, **OPTIONS)
 """Decorator of functions that only compiled code calls."""
 
 PATIENCE = 1.5  # seconds of compiling that pass without a word: one changed kernel takes less
-NOTICE = "qpsafe: compiling for this machine, once, takes about half a minute ..."
+NOTICE = "qpsafe: compiling for this machine, once, takes about a minute ..."
 
 
 class _Watch(event.Listener):

@@ -49,10 +49,10 @@ if TYPE_CHECKING:
 class Parts(Sensors):
     """The parts of a `SafetyController`.
 
-    Given at construction: `robot`, `dt`, `spots`, `rules`, `sensing`, `ranging`, `recovery_rules`, `recovery`; setting
-    one is an AttributeError. Exchanged by assignment: `law`, `field`, `activation`, `evasion`, `limits`, `barrier`,
-    `gate`, `clearance`, `separation`; what does not fit is a ConfigurationError, and nothing has changed. Tasks by
-    `set_tasks`.
+    Given at construction: `robot`, `dt`, `spots`, `known`, `carried`, `range_sensors`, `rules`, `sensing`, `ranging`,
+    `recovery_rules`, `recovery`; setting one is an AttributeError. Exchanged by assignment: `law`, `field`,
+    `activation`, `evasion`, `limits`, `barrier`, `gate`, `clearance`, `separation`; what does not fit is a
+    ConfigurationError, and nothing has changed. Tasks by `set_tasks`.
     """
 
     _tasks: tuple[Task, ...]

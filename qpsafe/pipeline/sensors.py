@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
@@ -37,7 +38,7 @@ class Sensors:
     _sensing: DistanceSensing | None
     _ranging: RangeSensing | None
     _units: UnitWatch
-    _known: Sequence[Obstacle]
+    _known: tuple[Obstacle, ...]
     _carried: Mapping[str, Sequence[Obstacle]] | None
 
     def _set_sensors(
@@ -75,6 +76,21 @@ class Sensors:
     def ranging(self) -> RangeSensing | None:
         """The sensors of many zones with what they remember."""
         return self._ranging
+
+    @property
+    def range_sensors(self) -> tuple[RangeSensor, ...]:
+        """The sensors of many zones."""
+        return () if self._ranging is None else tuple(self._ranging.sensors)
+
+    @property
+    def known(self) -> tuple[Obstacle, ...]:
+        """Known obstacles of the surroundings."""
+        return self._known
+
+    @property
+    def carried(self) -> Mapping[str, tuple[Obstacle, ...]]:
+        """What tools may carry, by frame."""
+        return MappingProxyType({frame: tuple(things) for frame, things in (self._carried or {}).items()})
 
     def acknowledge(self) -> None:
         """A person has seen to the sensors: those that work again are trusted again, a stop they caused is lifted."""

@@ -43,7 +43,12 @@ COLUMNS = (
     Column("seed", int, "1", "of everything random in the trial: the campaign's first seed + trial"),
     Column("motion", str, "", "what the robot does: hold (a pose), line, pick (and place), or a program's file"),
     Column("controller", str, "", "name of the controller"),
-    Column("sensor", str, "", "what it sees people by: ideal or sharp spots, perfect (true nearest points), none"),
+    Column(
+        "sensor",
+        str,
+        "",
+        "what it sees people by: ideal, sharp, vl53l5cx, depth, some joined by +, perfect (true points), none",
+    ),
     Column("simulated", float, "s", "how long the trial lasted, in its own time"),
     Column("contact", bool, "", "whether the robot touched a person or what they carry"),
     Column("contact_time", float, "s", "when it first did"),

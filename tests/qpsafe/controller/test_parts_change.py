@@ -331,6 +331,9 @@ def test_exchanged_limits_hold_for_braking_from_the_next_tick_on() -> None:
         ("barrier", qpsafe.DangerBarrier(12.0, field=WEAK)),
         ("tasks", []),
         ("dt", 0.001),
+        ("known", [qpsafe.Obstacle.box("floor", (6.0, 6.0, 0.5), (0.0, 0.0, -0.25))]),
+        ("carried", {}),
+        ("range_sensors", ()),
     ],
 )
 def test_what_does_not_fit_is_refused_and_nothing_has_changed(key: str, value: Any) -> None:
@@ -338,7 +341,7 @@ def test_what_does_not_fit_is_refused_and_nothing_has_changed(key: str, value: A
     before = getattr(controller, key)
     with pytest.raises((qpsafe.ConfigurationError, AttributeError), match=key):
         setattr(controller, key, value)
-    assert getattr(controller, key) is before
+    assert getattr(controller, key) is before or getattr(controller, key) == before
     for a, b in zip(*(run(one, range(40), ROBOT.home, np.zeros(N)) for one in (controller, other)), strict=True):
         assert a.reference == b.reference
 

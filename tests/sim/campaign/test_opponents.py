@@ -153,3 +153,9 @@ def test_a_users_controller_takes_part_by_name(monkeypatch: pytest.MonkeyPatch) 
     for wrong in ("nobody", "no.such.module:thing", "math:nothing", "math:pi"):
         with pytest.raises(ConfigurationError, match="controllers"):
             opponent(wrong)
+
+
+def test_the_guide_says_what_every_controller_is() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "campaign.md").read_text(encoding="utf-8")
+    for name in names():
+        assert f"| `{name}` | {opponent(name).sentence} |" in page
