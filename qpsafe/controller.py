@@ -129,7 +129,7 @@ class SafetyController(Running):
             RecoveryRules(**dict(robot.tuned.recovery)) if recovery is None else checked_recovery(recovery)
         )
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
-        self._stages = Stages(robot, self._dt, known, carried, self._rules.max_age)
+        self._stages = Stages(robot, self._dt, self._known, self._carried, self._rules.max_age)
         self._stages.sense(self._sensing, self._field, self._evasion, self._ranging)
         self._stages.resolve(self._tasks, self._law)
         _ = self.verifies  # what it measures by is made here
@@ -161,8 +161,7 @@ class SafetyController(Running):
         Returns:
             The tick, with the joint reference to send.
         """
-        start = time.perf_counter()
-        clocks = self._recovery.clocks
+        start, clocks = time.perf_counter(), self._enter()
         try:
             tick = self._plan(q, qd, distances, points, ages, images, now)
         except BaseException as error:
@@ -173,6 +172,8 @@ class SafetyController(Running):
                 tick = self._brake(FAULT, in_words(error))
             else:  # somebody ends the program: nothing has moved
                 raise
+        finally:
+            self._at_work = False
         tick.severity, tick.unseen = self._unseen()
         self._advance(tick.reference)
         tick.solve_time = time.perf_counter() - start
@@ -203,11 +204,10 @@ class SafetyController(Running):
         cdf_n, qd0 = seen.cdf_n, seen.qd0
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
-        switches, activations, regime = self._activation.at(cdf_n)
+        switches, activations, regime = self._switching(cdf_n)
         commanded = RobotState(self._robot, self._q)
         old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
-        gate = self.verifies
-        people, leads = seen.people, seen.leads
+        gate, people, leads = self.verifies, seen.people, seen.leads
         most = gate.hold(self._q, self._qd, people, old, leads) if gate is not None and len(people) else None
         stall = self._stall
         if self._seq % stall.every == 0 or stall.held:

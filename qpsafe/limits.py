@@ -17,11 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.given import number, numbers
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
+#: A shorter tick is meant in other units, and leaves nothing to compute with [s].
+SHORTEST_TICK = 1e-6
+#: Between these rates can be computed with.
+LEAST, MOST = 1e-100, 1e100
 #: Kinds of limits by their code; 0 stands for none.
 KINDS = ("", "position", "velocity", "acceleration", "jerk", "stillness")
 
@@ -106,13 +111,13 @@ class JointLimits(Fixed):
         return_speed: float = 0.1,
         max_jerk: ArrayLike | None = None,
     ) -> None:
-        self.lower = _numbers("lower", lower)
-        self.upper = _numbers("upper", upper)
-        self.max_velocity = _numbers("max_velocity", max_velocity)
-        self.max_acceleration = _numbers("max_acceleration", max_acceleration)
-        self.dt = float(_numbers("dt", dt, 0))
-        self.return_speed = float(_numbers("return_speed", return_speed, 0))
-        self.max_jerk = None if max_jerk is None else np.array(max_jerk, dtype=float)
+        self.lower, self.upper = _per_joint("lower", lower), _per_joint("upper", upper)
+        self.max_velocity = _per_joint("max_velocity", max_velocity)
+        self.max_acceleration = _per_joint("max_acceleration", max_acceleration)
+        self.dt = number("JointLimits", "dt", dt, f"finite and > 0, from {SHORTEST_TICK:g} s", SHORTEST_TICK)
+        expected = f"finite and > 0, from {LEAST:g} to {MOST:g}"
+        self.return_speed = number("JointLimits", "return_speed", return_speed, expected, LEAST, most=MOST)
+        self.max_jerk = None if max_jerk is None else _per_joint("max_jerk", max_jerk)
         shape = self.lower.shape
         rates = ("max_velocity", "max_acceleration") + (() if max_jerk is None else ("max_jerk",))
         for key in ("upper", *rates):
@@ -120,10 +125,10 @@ class JointLimits(Fixed):
                 raise ConfigurationError("JointLimits", key, getattr(self, key), f"an array of shape {shape}")
         if not (self.lower <= self.upper).all():
             raise ConfigurationError("JointLimits", "lower", self.lower, f"numbers <= upper = {self.upper}")
-        for key in (*rates, "dt", "return_speed"):
-            value = np.asarray(getattr(self, key))
-            if not (np.isfinite(value).all() and (value > 0.0).all()):
-                raise ConfigurationError("JointLimits", key, getattr(self, key), "finite and > 0")
+        for key in rates:
+            value = getattr(self, key)
+            if not ((value >= LEAST) & (value <= MOST)).all():  # false for NaN
+                raise ConfigurationError("JointLimits", key, value, expected)
 
         self.table = np.array((self.lower, self.upper, self.max_velocity, self.max_acceleration))  # for compiled code
 
@@ -190,15 +195,8 @@ def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, d
     return limits
 
 
-def _numbers(key: str, value: ArrayLike, ndim: int = 1) -> NDArray[np.float64]:
-    """`value` as an array of its own, or a ConfigurationError."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = None
-    if array is None or array.ndim != ndim:
-        raise ConfigurationError("JointLimits", key, value, "a number" if ndim == 0 else "one number a joint")
-    return array
+def _per_joint(key: str, value: ArrayLike) -> NDArray[np.float64]:
+    return numbers("JointLimits", key, value, "one number a joint", ndim=1)
 
 
 @entry(types.float64(types.float64, types.float64, types.float64))

@@ -93,6 +93,6 @@ class RelativeFrameTask(FrameTask):
     def misfit(self, robot: Robot) -> Misfit | None:
         """Unknown frames, by the argument that names them."""
         found = super().misfit(robot)
-        if found is not None and self.frame in robot.frame_names:
+        if found is not None and found.value is not self.frame:
             return found._replace(key="base")
         return found

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.task import Misfit, Task
 from qpsafe.tasks.trajectory import FixedJoints, JointSample, Trajectory
+from qpsafe.text.given import parts, whole
 from qpsafe.text.words import call, counted
 
 if TYPE_CHECKING:
@@ -37,10 +38,7 @@ class JointTask(Task):
 
     def __init__(self, trajectory: Trajectory, gain: float = 5.0, joints: Sequence[int] | None = None) -> None:
         super().__init__(trajectory, gain)
-        good = joints is None or (len(joints) > 0 and len(set(joints)) == len(joints) and min(joints) >= 0)
-        if not good:
-            raise ConfigurationError(type(self).__name__, "joints", joints, "different numbers from 0, or None")
-        self.joints = None if joints is None else tuple(int(joint) for joint in joints)
+        self.joints = None if joints is None else _checked_joints(type(self).__name__, joints)
         self._endless: NDArray[np.bool_] | None = None  # of the robot whose value was last asked for
 
     def __repr__(self) -> str:
@@ -82,6 +80,14 @@ class JointTask(Task):
         if not isinstance(sample, JointSample) or sample.position.shape != (robot.nq,):
             return Misfit("trajectory", self.trajectory, f"a trajectory of {counted(robot.nq, 'joint')}")
         return None
+
+
+def _checked_joints(where: str, joints: Sequence[int]) -> tuple[int, ...]:
+    expected = "different whole numbers from 0, or None"
+    chosen = tuple(whole(where, "joints", joint, expected, 0) for joint in parts(where, "joints", joints, expected))
+    if len(chosen) == 0 or len(set(chosen)) != len(chosen):
+        raise ConfigurationError(where, "joints", joints, expected)
+    return chosen
 
 
 class PostureTask(JointTask):

@@ -13,7 +13,8 @@ from qpsafe.fixed import Fixed
 from qpsafe.tasks.rotation import exp3, log3
 from qpsafe.tasks.timing import Rates, TimeLaw
 from qpsafe.tasks.trajectory import JointSample, Sample, checked_pose, checked_vector
-from qpsafe.text.words import call
+from qpsafe.text.given import number, one_of
+from qpsafe.text.words import call, counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -51,6 +52,9 @@ class Line(Fixed):
 
     def __init__(self, start: ArrayLike, goal: ArrayLike, linear: Rates = LINEAR, angular: Rates = ANGULAR) -> None:
         name = type(self).__name__
+        for key, rates in (("linear", linear), ("angular", angular)):
+            if not isinstance(rates, Rates):
+                raise ConfigurationError(name, key, rates, "Rates(speed, acceleration, jerk)")
         self.start, self.goal = checked_pose(name, "start", start), checked_pose(name, "goal", goal)
         self._turn = log3(self.goal[:3, :3] @ self.start[:3, :3].T)
         self._turns = bool(self._turn.any())
@@ -63,8 +67,8 @@ class Line(Fixed):
             expected = "a pose to move to, at a finite distance from the start"
             raise ConfigurationError(name, "goal", self.goal[:3, 3].tolist(), expected)
         sizes = (self._admissible(linear), self.length), (angular, self.angle)
-        rates = [r.over(size) for r, size in sizes if size > SMALL]
-        tightest = rates[0] if len(rates) == 1 else rates[0].both(rates[1])
+        shares = [r.over(size) for r, size in sizes if size > SMALL]
+        tightest = shares[0] if len(shares) == 1 else shares[0].both(shares[1])
         #: Time law of the share u of the way, from 0 to 1.
         self.law = TimeLaw([0.0], [1.0], [tightest.speed], [tightest.acceleration], [tightest.jerk])
         self.duration = self.law.duration
@@ -157,9 +161,8 @@ class Dwell(Fixed):
     fixed = frozenset(("pose", "duration"))
 
     def __init__(self, pose: ArrayLike, duration: float) -> None:
-        if not (isinstance(duration, int | float) and 0.0 <= duration < math.inf):
-            raise ConfigurationError("Dwell", "duration", duration, "a finite time >= 0 [s]")
-        self.pose, self.duration = checked_pose("Dwell", "pose", pose), float(duration)
+        self.duration = number("Dwell", "duration", duration, "a finite time >= 0 [s]", 0.0)
+        self.pose = checked_pose("Dwell", "pose", pose)
 
     def __repr__(self) -> str:
         return call(self, self.pose[:3, 3], duration=self.duration)
@@ -209,13 +212,24 @@ class JointMoveOfFrame(Fixed):
         robot: The robot.
         frame: Frame whose pose is given.
         move: Of the robot's joints.
+
+    Raises:
+        ConfigurationError: The robot has no such frame, or other joints.
     """
 
     fixed = frozenset(("robot", "frame", "move", "duration"))
 
     def __init__(self, robot: Robot, frame: str, move: JointMove) -> None:
+        name = type(self).__name__
+        if not hasattr(robot, "frame_names"):
+            raise ConfigurationError(name, "robot", robot, "a Robot, e.g. qpsafe.load_robot('irb140')")
+        one_of(name, "frame", frame, tuple(robot.frame_names))
+        expected = f"a JointMove of {counted(robot.nq, 'joint')}"
+        sample = move.sample(0.0) if callable(getattr(move, "sample", None)) and not isinstance(move, type) else None
+        if not isinstance(sample, JointSample) or sample.position.shape != (robot.nq,):
+            raise ConfigurationError(name, "move", move, expected)
+        self.duration = number(name, "move", getattr(move, "duration", None), expected, 0.0)
         self.robot, self.frame, self.move = robot, frame, move
-        self.duration = move.duration
 
     def __repr__(self) -> str:
         return call(self, self.frame, self.move)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
 from qpsafe.tasks.clik import Clik
 from qpsafe.tasks.rotation import euler_difference, euler_zyx, euler_zyx_rates, log3
 from qpsafe.tasks.task import PoseTask, Task
 from qpsafe.tasks.trajectory import Sample, Trajectory
+from qpsafe.text.given import one_of
 
 if TYPE_CHECKING:
     from qpsafe.robot.state import RobotState
@@ -41,8 +41,7 @@ class OrientationTask(PoseTask):
     name = "orientation"
 
     def __init__(self, frame: str, trajectory: Trajectory, gain: float = 10.0, form: Form = "rotation vector") -> None:
-        if form not in get_args(Form):
-            raise ConfigurationError("OrientationTask", "form", form, f"one of {get_args(Form)}")
+        one_of("OrientationTask", "form", form, get_args(Form))
         super().__init__(frame, trajectory, gain)
         self.form = form
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.moves import Move
 from qpsafe.tasks.trajectory import Sample
+from qpsafe.text.given import number, parts, whole
 from qpsafe.text.words import counted
 
 
@@ -41,9 +42,19 @@ class Program(Fixed):
     def __init__(
         self, moves: Sequence[Move], events: Sequence[tuple[int, str]] = (), cycle: bool = False, frame: str = ""
     ) -> None:
-        if not moves:
+        self.moves = parts("Program", "moves", moves, "a list of moves")
+        if not self.moves:
             raise ConfigurationError("Program", "moves", moves, "at least one move")
-        self.moves, self.cycle, self.frame = tuple(moves), cycle, frame
+        for k, move in enumerate(self.moves):
+            if not _is_move(move):
+                raise ConfigurationError(
+                    "Program", f"moves[{k}]", move, "a move of a pose that takes time, e.g. a Line"
+                )
+        if not isinstance(cycle, bool | np.bool_):
+            raise ConfigurationError("Program", "cycle", cycle, "True or False")
+        if not isinstance(frame, str):
+            raise ConfigurationError("Program", "frame", frame, 'the name of a frame, or ""')
+        self.cycle, self.frame = bool(cycle), frame
         followers = [*self.moves[1:], *self.moves[:1]] if cycle else self.moves[1:]
         for k, (move, after) in enumerate(zip(self.moves, followers, strict=False)):
             gap = np.abs(after.sample(0.0).pose - move.sample(move.duration).pose).max()
@@ -56,13 +67,18 @@ class Program(Fixed):
         if cycle and not self.duration > 0.0:
             raise ConfigurationError("Program", "cycle", cycle, "moves that take some time")
         starts = [0.0, *self._ends]
-        for k, (place, name) in enumerate(events):
-            if not 0 <= place <= len(self.moves):
-                raise ConfigurationError("Program", f"events[{k}]", place, f"0 to {len(self.moves)}")
-            if not name:
-                raise ConfigurationError("Program", f"events[{k}]", name, "a name")
+        found = []
+        for k, pair in enumerate(parts("Program", "events", events, "pairs of a number of a move and a name")):
+            key = f"events[{k}]"
+            both = parts("Program", key, pair, "a pair of a number of a move and a name")
+            if len(both) != 2:
+                raise ConfigurationError("Program", key, pair, "a pair of a number of a move and a name")
+            place = whole("Program", key, both[0], f"0 to {len(self.moves)}", 0, len(self.moves))
+            if not (isinstance(both[1], str) and both[1]):
+                raise ConfigurationError("Program", key, both[1], "a name")
+            found.append(Event(starts[place], both[1]))
         #: Events of one cycle, in their order.
-        self.events = tuple(sorted((Event(starts[place], name) for place, name in events), key=lambda e: e.time))
+        self.events = tuple(sorted(found, key=lambda event: event.time))
         self._last: tuple[float, Sample] | None = None  # several tasks ask for the same time
 
     def __repr__(self) -> str:
@@ -91,3 +107,12 @@ class Program(Fixed):
         round_, place = divmod(k, len(self.events))
         event = self.events[place]
         return Event(event.time + round_ * self.duration, event.name)
+
+
+def _is_move(move: Any) -> bool:
+    """Whether something has a finite duration and poses at both ends of it."""
+    try:
+        duration = number("Program", "duration", move.duration, "a finite time >= 0 [s]", 0.0)
+        return all(np.shape(move.sample(t).pose) == (4, 4) for t in (0.0, duration))
+    except (AttributeError, TypeError, ConfigurationError):
+        return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import operator
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +13,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.clik import Clik, pose_clik
 from qpsafe.tasks.trajectory import Sample, Trajectory
+from qpsafe.text.given import number
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Task(Fixed, ABC):
         ConfigurationError: The gain is not a positive finite number, or the trajectory is none.
     """
 
-    fixed = frozenset(("trajectory", "gain"))
+    fixed = frozenset(("trajectory", "gain", "name", "frames", "essential"))
     #: Name shown in reports.
     name: str = "task"
     #: Frames the value is made of.
@@ -53,13 +53,11 @@ class Task(Fixed, ABC):
     essential: bool = True
 
     def __init__(self, trajectory: Trajectory, gain: float) -> None:
-        if not (math.isfinite(gain) and gain > 0.0):
-            raise ConfigurationError(type(self).__name__, "gain", gain, "a finite number > 0 [1/s]")
+        self.gain = number(type(self).__name__, "gain", gain, "a finite number > 0 [1/s]", above=0.0)
         if isinstance(trajectory, type) or not callable(getattr(trajectory, "sample", None)):
             expected = "a Trajectory, i.e. something with sample(t), e.g. FixedPose(pose)"
             raise ConfigurationError(type(self).__name__, "trajectory", trajectory, expected)
         self.trajectory = trajectory
-        self.gain = float(gain)
 
     def __repr__(self) -> str:
         return call(self, *self.frames, self.trajectory, gain=self.gain)
@@ -103,10 +101,15 @@ class Task(Fixed, ABC):
         if "clik" not in own and any(key in own for key in ("value", "error", "jacobian", "velocity")):
             cls.clik = Task.clik  # type: ignore[method-assign]
 
+    def settle(self) -> None:
+        """Fix what the class says of the task: a controller that has it keeps its label."""
+        for key in ("name", "frames", "essential"):
+            self.__dict__.setdefault(key, getattr(self, key))
+
     def misfit(self, robot: Robot) -> Misfit | None:
         """Why `robot` cannot do this task, None if it can."""
         for frame in self.frames:
-            if frame not in robot.frame_names:
+            if not (isinstance(frame, str) and frame in robot.frame_names):
                 return Misfit("frame", frame, "one of " + ", ".join(robot.frame_names))
         return None
 
@@ -126,7 +129,7 @@ class PoseTask(Task):
     #: Rows of the geometric Jacobian that the task uses, of 0 to 5 in increasing order, linear before angular.
     rows: tuple[int, ...]
 
-    fixed = Task.fixed | {"frame", "frames", "rows"}
+    fixed = Task.fixed | {"frame", "rows"}
 
     def __init__(self, frame: str, trajectory: Trajectory, gain: float) -> None:
         super().__init__(trajectory, gain)
@@ -143,7 +146,7 @@ class PoseTask(Task):
         try:
             rows = tuple(sorted({operator.index(row) for row in given}))  # type: ignore[union-attr]
             good = rows == tuple(given) and len(rows) > 0 and 0 <= rows[0] <= rows[-1] < 6  # type: ignore[arg-type]
-        except TypeError:
+        except Exception:  # whatever a stranger's methods raise
             good = False
         if not good:
             raise ConfigurationError(type(self).__name__, "rows", given, "some of 0 to 5, in increasing order")

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.trajectory import checked_vector
+from qpsafe.text.given import number
 
 Array = NDArray[np.float64]
 
@@ -47,9 +48,8 @@ class Rates:
 
     def __post_init__(self) -> None:
         for key in ("speed", "acceleration", "jerk"):
-            value = getattr(self, key)
-            if not (isinstance(value, int | float) and 0.0 < value < math.inf):
-                raise ConfigurationError("Rates", key, value, "a finite number > 0")
+            value = number("Rates", key, getattr(self, key), "a finite number > 0", above=0.0)
+            object.__setattr__(self, key, value)
 
     def over(self, length: float) -> Rates:
         """The same rates of a parameter that is 1 at the end of a path of this length."""

@@ -12,7 +12,11 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
 from qpsafe.tasks.offset import displaced, offset_of
 from qpsafe.tasks.rotation import is_rotation, log3
+from qpsafe.text.given import numbers
 from qpsafe.text.words import call
+
+#: Squares of larger numbers, and sums of them, could not be computed with.
+MOST = 1e100
 
 
 class Sample(NamedTuple):
@@ -144,12 +148,9 @@ def checked_vector(where: str, key: str, vector: ArrayLike, size: int | None = N
         vector: As given.
         size: n; any if None.
     """
-    expected = f"{'some' if size is None else size} finite numbers"
-    try:
-        array = np.array(vector, dtype=float)
-    except (TypeError, ValueError):
-        raise ConfigurationError(where, key, vector, expected) from None
-    if array.ndim != 1 or array.size == 0 or size not in (None, array.size) or not np.isfinite(array).all():
+    expected = f"{'some' if size is None else size} finite numbers, up to {MOST:g}"
+    array = numbers(where, key, vector, expected, ndim=1)
+    if array.size == 0 or size not in (None, array.size) or not (np.abs(array) <= MOST).all():
         raise ConfigurationError(where, key, vector, expected)
     array.setflags(write=False)
     return array
@@ -164,11 +165,8 @@ def checked_pose(where: str, key: str, pose: ArrayLike) -> NDArray[np.float64]:
         pose: As given.
     """
     expected = "a homogeneous matrix (4, 4) with a proper rotation and last row 0 0 0 1"
-    try:
-        matrix = np.array(pose, dtype=float)
-    except (TypeError, ValueError):
-        raise ConfigurationError(where, key, pose, expected) from None
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+    matrix = numbers(where, key, pose, expected, ndim=2)
+    if matrix.shape != (4, 4) or not (np.abs(matrix) <= MOST).all():
         raise ConfigurationError(where, key, pose, expected)
     if not is_rotation(matrix[:3, :3]) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-12):
         raise ConfigurationError(where, key, pose, expected)

@@ -18,7 +18,11 @@ from qpsafe.batch.pack import HORIZON
 from qpsafe.batch.result import BatchTick
 from qpsafe.controller import SafetyController
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import number, whole
 from qpsafe.text.words import call
+
+#: More robots, or a horizon of more ticks, fit into no memory.
+MOST_ROBOTS, MOST_TICKS = 1_000_000, 10_000_000
 
 
 class BatchController:
@@ -48,20 +52,21 @@ class BatchController:
         if controller.ranging is not None:  # its robots would go on without what they see by
             expected = "none: a batch takes no images; give distances or points"
             raise ConfigurationError("BatchController", "range_sensors", controller.ranging.sensors, expected)
-        for key, value in (("n", n), ("threads", 1 if threads is None else threads)):
-            if not (isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= 1):
-                raise ConfigurationError("BatchController", key, value, "a whole number >= 1")
-        if not 0.0 < horizon < np.inf:
-            raise ConfigurationError("BatchController", "horizon", horizon, "a finite time > 0 [s]")
+        n = whole("BatchController", "n", n, f"a whole number from 1 to {MOST_ROBOTS}", 1, MOST_ROBOTS)
+        threads = _cores() if threads is None else threads
+        threads = whole("BatchController", "threads", threads, "a whole number >= 1", 1)
+        longest = controller.dt * MOST_TICKS
+        expected = f"a time from one tick to {longest:g} s"
+        horizon = number("BatchController", "horizon", horizon, expected, controller.dt, most=longest)
         self._controller = copy(controller)
         self._controller.reset()
-        self._n = int(n)
+        self._n = n
         self._spots = 0 if controller.spots is None else len(controller.spots)
         #: Why the ticks are not compiled, in words; empty if they are.
         self.why = ""
         try:
             self._robots: CompiledRobots | GeneralRobots = CompiledRobots(
-                self._controller, self._n, _cores() if threads is None else int(threads), horizon
+                self._controller, self._n, threads, horizon
             )  # fmt: skip
         except Refused as reason:
             self.why, self._robots = str(reason), GeneralRobots(self._controller, self._n)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def bench(
-    ticks: Annotated[int, typer.Option(min=100, help="Number of controller ticks to time.")] = 20_000,
+    ticks: Annotated[int, typer.Option(min=100, max=10_000_000, help="Number of controller ticks to time.")] = 20_000,
     out: Annotated[
         Path | None, typer.Option(help="Also write the results to this JSON file.", callback=output_file(".json"))
     ] = None,

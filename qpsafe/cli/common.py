@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +16,7 @@ from typer.core import TyperGroup
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.json_text import json_text
+from qpsafe.text.whole_file import whole_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -118,12 +120,15 @@ def console(json_output: bool) -> Console:
     """Where people read: the screen, or standard error when a program reads standard output.
 
     Text is plain: brackets and colons in names from files mean nothing, colours are given as styles. With NO_COLOR set
-    there are none at all, whatever else is set.
+    there are none at all, whatever else is set. Where COLUMNS is 0, 80 are meant.
     """
     from rich.console import Console
 
     colours = None if os.environ.get("NO_COLOR") else "auto"
-    return Console(stderr=json_output, markup=False, emoji=False, highlight=False, color_system=colours)  # type: ignore[arg-type]
+    screen = Console(stderr=json_output, markup=False, emoji=False, highlight=False, color_system=colours)  # type: ignore[arg-type]
+    if screen.width < 1:
+        screen.width = 80
+    return screen
 
 
 def verdict(good: bool, yes: str = "kept", no: str = "NOT kept") -> Text:
@@ -213,18 +218,31 @@ def show_matrix(results: Sequence[Any], show: Callable[[Any, Console], None], sc
 
 
 def print_json(value: Any) -> None:
-    """Write a value to standard output as JSON."""
-    sys.stdout.write(json_text(value) + "\n")
+    """Write a value to standard output as JSON; nowhere if that is closed."""
+    if sys.stdout is not None:
+        sys.stdout.write(json_text(value) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
-    part = path.with_name("." + path.name + ".part")
-    try:
+    with whole_file(path) as part:
         part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+
+
+def finite(context: typer.Context, param: typer.CallbackParam, value: float | None) -> float | None:
+    """Callback of an option: a number that is one, neither infinite nor NaN, which no bound holds back.
+
+    Args:
+        context: The command's.
+        param: The option.
+        value: What was typed, None for nothing.
+
+    Raises:
+        ConfigurationError: It is something else.
+    """
+    if value is not None and not math.isfinite(value):
+        raise ConfigurationError(context.command_path, param.opts[0], value, "a finite number")
+    return value
 
 
 def refuse_idle(context: typer.Context, switch: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import signal
 import sys
 from typing import Annotated
@@ -72,6 +73,8 @@ def main() -> None:
     """Entry point: errors a person can mend are one line, without a traceback; Ctrl-C leaves no half files."""
     signal.signal(signal.SIGINT, _interrupt)
     signal.signal(signal.SIGTERM, _interrupt)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # what it cannot show is spelt, as on standard error
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         app()
     except QpsafeError as error:

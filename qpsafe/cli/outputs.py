@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -86,7 +87,7 @@ def try_file(where: str, key: str, path: Path, *suffixes: str) -> None:
             raise ConfigurationError(where, key, str(path), "a file, or a name for a new one")
         if not path.parent.is_dir():
             raise ConfigurationError(where, key, str(path), "a file in a folder that is there")
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part"):
             pass
     except OSError as error:
         raise ConfigurationError(where, key, str(path), f"a file that can be written ({_reason(error)})") from None
@@ -94,6 +95,30 @@ def try_file(where: str, key: str, path: Path, *suffixes: str) -> None:
         if isinstance(error, ConfigurationError):
             raise
         raise ConfigurationError(where, key, str(path), f"a file that can be written ({error})") from None
+
+
+def keep_apart(where: str, *files: tuple[str, Path | None]) -> None:
+    """Refuse to write over a file that is read, or that is written already.
+
+    Args:
+        where: Who asks, for the error.
+        files: Name of each option or argument and its file, None for none; what is read comes first.
+
+    Raises:
+        ConfigurationError: Two of them are the same file, whatever they are called.
+    """
+    given = [(key, path) for key, path in files if path is not None]
+    for k, (key, path) in enumerate(given):
+        for other, there in given[:k]:
+            if _same(path, there):
+                raise ConfigurationError(where, key, str(path), f"another file than {other}")
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two paths are one file; where names differ in case alone, only the disk can tell."""
+    if os.path.exists(one) and os.path.exists(other):
+        return os.path.samefile(one, other)
+    return os.path.realpath(one) == os.path.realpath(other)
 
 
 def _reason(error: Exception) -> str:

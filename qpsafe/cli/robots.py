@@ -10,6 +10,7 @@ import typer
 
 from qpsafe.cli.common import Group, console, print_json, write_text
 from qpsafe.cli.outputs import output_folder, try_folder
+from qpsafe.text.whole_file import whole_file
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def robots(
 ) -> None:
     """List the bundled robots; `robots NAME` inspects one, `robots add FILE` begins one of your own."""
     if context.invoked_subcommand is not None:
+        context.default_map = {context.invoked_subcommand: {"json": json}}  # --json before the command is meant for it
         return
     from qpsafe.robot.loader import bundled_robots, load_robot
 
@@ -134,20 +136,17 @@ def add(
         raise ConfigurationError("robots add", "FILE", file, "an MJCF or URDF file: this robot has its robot.toml")
     robot = _load(file)
     folder = robot.folder if out is None else out
-    path, part = folder / "robot.toml", folder / ".robot.toml.part"
+    path = folder / "robot.toml"
     if path.exists() and not force:
         raise ConfigurationError("robots add", "robot.toml", str(path), "no such file yet; --force writes over it")
     try_folder("qpsafe robots add", "FILE" if out is None else "--out", folder)
     text, spots, said = _first_files(robot, folder)
     folder.mkdir(parents=True, exist_ok=True)
-    try:
+    with whole_file(path) as part:
         part.write_text(text, encoding="utf-8")
         again = load_quietly(robot.model_path, part)  # what does not load is not written
         if spots is not None:
             write_text(folder / "spots.toml", spots)  # before the file that names it
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
     if json:
         print_json({"file": str(path), "name": again.name, "joints": again.nq, "notes": said})
         return

@@ -38,14 +38,21 @@ def tune(
     people: Annotated[
         Path | None, typer.Option(help="TOML file with a model of people or a story, or a folder of these.")
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, help="How many values to try, the present ones among them.")] = 400,
+    trials: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="How many values to try, the present ones among them.")
+    ] = 400,
     minutes: Annotated[float | None, typer.Option(min=0.0, help="No more are begun after this time.")] = None,
     seed: Annotated[int, typer.Option(help="Number of the search, 0 to 99: of its people and all else random.")] = 0,
     prefer: Annotated[str, typer.Option(help="What is chosen of the front: safety, balanced or work.")] = "balanced",
     finals: Annotated[
-        int, typer.Option(min=0, help="New encounters by which the choice is made among the best; 0 for none.")
+        int,
+        typer.Option(
+            min=0, max=10_000_000, help="New encounters by which the choice is made among the best; 0 for none."
+        ),
     ] = 972,
-    judge: Annotated[int, typer.Option(min=0, help="Encounters that judge the choice; 0 for none.")] = 1200,
+    judge: Annotated[
+        int, typer.Option(min=0, max=10_000_000, help="Encounters that judge the choice; 0 for none.")
+    ] = 1200,
     workers: Workers = WORKERS,
     dask: Dask = None,
     write: Annotated[

@@ -19,7 +19,11 @@ from numpy.typing import NDArray
 from qpsafe.compiled.compiled import inline
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.text.given import number, parts
 from qpsafe.text.words import call, counted
+
+#: Between these Δ and ε Δ can be computed with.
+LEAST, MOST = 1e-100, 1e100
 
 
 def switch(danger: float, start: float, end: float, delta: float, epsilon: float) -> float:
@@ -74,10 +78,14 @@ class Threshold:
     epsilon: float
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.delta) and self.delta > 0.0):
-            raise ConfigurationError("Threshold", "delta", self.delta, "a finite number > 0")
-        if not (0.0 < self.epsilon < 1.0):
-            raise ConfigurationError("Threshold", "epsilon", self.epsilon, "a number strictly between 0 and 1")
+        expected = f"a number > 0, from {LEAST:g} to {MOST:g}"
+        delta = number("Threshold", "delta", self.delta, expected, LEAST, most=MOST)
+        expected = "a number strictly between 0 and 1"
+        epsilon = number("Threshold", "epsilon", self.epsilon, expected, LEAST)
+        if not epsilon < 1.0:
+            raise ConfigurationError("Threshold", "epsilon", self.epsilon, expected)
+        object.__setattr__(self, "delta", delta)
+        object.__setattr__(self, "epsilon", epsilon)
 
     @cached_property
     def start(self) -> float:
@@ -128,9 +136,12 @@ class Activation(Fixed):
     fixed = frozenset(("thresholds", "levels", "counts"))
 
     def __init__(self, thresholds: tuple[Threshold, ...] = (Threshold(11.5, 0.15), Threshold(7.5, 0.25))) -> None:
-        self.thresholds = tuple(thresholds)
+        self.thresholds = parts("Activation", "thresholds", thresholds, "at least one Threshold")
         if not self.thresholds:
             raise ConfigurationError("Activation", "thresholds", thresholds, "at least one Threshold")
+        for k, threshold in enumerate(self.thresholds):
+            if not isinstance(threshold, Threshold):
+                raise ConfigurationError("Activation", f"thresholds[{k}]", threshold, "a Threshold(delta, epsilon)")
         # the different ones, and the number of tasks that each one switches
         self.levels = tuple(threshold for threshold, _ in groupby(self.thresholds))
         self.counts = tuple(len(tuple(group)) for _, group in groupby(self.thresholds))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import number, numbers, whole
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
 PAPER_MASS, PAPER_DAMPING = 4.0, 20.0
 #: The rule of `Evasion.for_robot`: shares of a joint's largest speed and of the time in which it gets there.
 SPEED_SHARE, TIME_SHARE = 0.5, 0.3
+MOST_JOINTS = 1000  # a robot can have; beyond it matrices do not fit anywhere
 CONFIGURATIONS = 32  # that a robot's levers are looked for in
 
 
@@ -111,14 +113,18 @@ class Evasion:
     def __init__(self, mass: ArrayLike, damping: ArrayLike, n: int, dt: float = 0.004) -> None:
         from scipy.linalg import expm
 
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise ConfigurationError("Evasion", "dt", dt, "a finite time > 0 [s]")
-        self._dt = float(dt)
+        self._dt = number("Evasion", "dt", dt, "a finite time > 0 [s]", above=0.0)
+        n = whole("Evasion", "n", n, "a whole number of joints, at least 1", 1, MOST_JOINTS)
         self._mass = _positive_definite(mass, n, "mass")
         self._damping = _positive_definite(damping, n, "damping")
         # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
-        self._A = expm(-np.linalg.solve(self._mass, self._damping) * dt)
-        self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
+        with np.errstate(over="ignore", invalid="ignore"):
+            rates = np.linalg.solve(self._mass, self._damping) * self._dt
+            if np.isfinite(rates).all():
+                self._A = expm(-rates)
+                self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
+        if not (np.isfinite(rates).all() and np.isfinite(self._A).all() and np.isfinite(self._B).all()):
+            raise ConfigurationError("Evasion", "damping", damping, "numbers that can be divided by those of mass")
         for array in (self._mass, self._damping, self._A, self._B):
             array.flags.writeable = False
         self._velocity = np.zeros(n)
@@ -257,10 +263,7 @@ _levers: WeakKeyDictionary[Robot, NDArray[np.float64]] = WeakKeyDictionary()
 def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:
     """Scalar, diagonal or full matrix as a checked (n, n) symmetric positive definite array."""
     expected = f"a positive scalar, ({n},) positive diagonal or ({n}, {n}) symmetric positive definite matrix"
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ConfigurationError("Evasion", key, value, expected) from None
+    array = numbers("Evasion", key, value, expected)
     if array.ndim < 2 and array.shape in ((), (1,), (n,)):
         array = np.diag(np.broadcast_to(array, n).astype(float))
     if array.shape != (n, n) or not np.isfinite(array).all() or not np.allclose(array, array.T):

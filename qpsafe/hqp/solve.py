@@ -101,14 +101,28 @@ def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array
     return near
 
 
-def require_solver(solver: str | None) -> None:
-    """Say at once where a solver is not installed that only an extra brings.
+def require_solver(solver: str | None, where: str = "solve_hierarchy") -> str:
+    """The back end of qpsolvers behind a solver, empty for the others; what is no solver is refused at once.
+
+    Args:
+        solver: As given.
+        where: Who asks, for the error.
 
     Raises:
-        MissingExtraError: Names the extra.
+        ConfigurationError: There is none of this name.
+        MissingExtraError: It is not installed; names the extra that brings it.
     """
-    if solver == "proxqp":
-        require("proxqp", 'solver = "proxqp"', "proxsuite")
+    if solver is None or (isinstance(solver, str) and solver in ("own", "daqp", "proxqp")):
+        if solver == "proxqp":
+            require("proxqp", 'solver = "proxqp"', "proxsuite")
+        return ""
+    import qpsolvers
+
+    prefix, _, name = solver.partition(":") if isinstance(solver, str) else ("", "", "")
+    if prefix != "qpsolvers" or name not in qpsolvers.available_solvers:
+        known = ", ".join(f'"qpsolvers:{name}"' for name in qpsolvers.available_solvers)
+        raise ConfigurationError(where, "solver", solver, f'"own", "daqp", "proxqp" or one of {known}')
+    return name
 
 
 def _own(problem: Packed, begin: float, damping: Array | None = None, note: str = "") -> Solution:
@@ -139,8 +153,7 @@ def note_of(status: str, where: int, problem: Packed) -> str:
 
 def _by_back_end(problem: Packed, solver: str, begin: float) -> Solution:
     """Solve with somebody else's solver; the own one judges the result, and answers where it fails."""
-    require_solver(solver)
-    backend = "" if solver in ("daqp", "proxqp") else _backend(solver)
+    backend = require_solver(solver)
     own = _own(problem, begin)
     if own.status in (INVALID_DATA, INVALID_LIMITS, FAILED):
         return own
@@ -192,14 +205,3 @@ def _name(problem: Packed, level: int) -> str:
     if level == len(problem.counts) - problem.hard:
         return "the closing smallest norm"
     return "the hard rows" if level < 0 else f"level {level}"
-
-
-def _backend(solver: str) -> str:
-    """Name of the qpsolvers back end behind "qpsolvers:<name>"."""
-    import qpsolvers
-
-    prefix, _, name = solver.partition(":") if isinstance(solver, str) else ("", "", "")
-    if prefix != "qpsolvers" or name not in qpsolvers.available_solvers:
-        known = ", ".join(f'"qpsolvers:{name}"' for name in qpsolvers.available_solvers)
-        raise ConfigurationError("solve_hierarchy", "solver", solver, f'"own", "daqp", "proxqp" or one of {known}')
-    return name

@@ -27,7 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.transport.addresses import host_address, peer_address, udp_port
+from qpsafe.irc5.transport.arrival import Waits, receive
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.text.given import whole
 from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
@@ -35,6 +38,11 @@ Array = NDArray[np.float64]
 DEFAULT_PORT = 6511
 #: A sender's clock may run ahead by this [s]; ages further below zero are passed on as they are, and are sick.
 CLOCK_ERROR = SensingRules.clock_error
+#: What came less than this before it was first read counts as new [s]: half the age at which distances are stale, so
+#: that a run in lock-step, where a busy computer takes its time, is the same to the bit as one without a wire.
+NEW = 0.5 * SensingRules.max_age
+#: Most spots of a datagram without ages.
+MOST_SPOTS = 8185
 _HEAD = struct.Struct("<4sBBHIIQ")
 _MAGIC, _VERSION, _AGES = b"QPSD", 1, 1
 
@@ -107,31 +115,37 @@ class SensorCounts:
 class SensorInput:
     """Where the loop gets its distances from: never waits, never raises on what arrives.
 
+    Ages are counted from the arrival at this computer: what waited in the socket is as old as it is.
+
     Args:
         count: Number of spots.
-        host: Address of the interface to listen at; loopback by default.
+        host: Address of the interface to listen at, or a name of it; loopback by default.
         port: 0 lets the system choose one.
-        peer: Host that may send; by default the first that sends a sampling.
+        peer: Host that may send, by its address or name; by default the first that sends a sampling.
 
     Raises:
-        ConfigurationError: The address cannot be had.
+        ConfigurationError: The count is none, a host has no address, or the address to listen at cannot be had.
     """
 
     RESTART_AFTER = 1.0  # after this silence, another port or a lower sequence number is a restarted sender [s]
 
     def __init__(self, count: int, host: str = "127.0.0.1", port: int = DEFAULT_PORT, peer: str | None = None) -> None:
-        self.count, self.counts = count, SensorCounts()
+        expected = f"a number of spots, 0 to {MOST_SPOTS}"
+        self.count, self.counts = whole("SensorInput", "count", count, expected, 0, MOST_SPOTS), SensorCounts()
         self.refusal = ""  # the last one in words
-        self._host, self._port = peer, 0
+        self._host, self._port = None if peer is None else peer_address(peer, "SensorInput"), 0
+        where = host_address("SensorInput", "host", host), udp_port("SensorInput", port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._waits = Waits(self._socket)
         try:
-            self._socket.bind((host, port))
-        except (OSError, OverflowError) as error:
+            self._socket.bind(where)
+        except OSError as error:
             self._socket.close()
             raise ConfigurationError("SensorInput", "address", f"{host}:{port}", f"a free address ({error})") from None
         self._socket.setblocking(False)
         self._newest: Distances | None = None
-        self._arrived = -np.inf
+        self._told = False  # whether it has been read
+        self._arrived = -np.inf  # on the clock of whoever reads [s]
 
     @property
     def address(self) -> tuple[str, int]:
@@ -146,45 +160,57 @@ class SensorInput:
     def read(self, now: float | None = None) -> tuple[Array, Array]:
         """The newest sampling: distances (k,) [m] and how old each is (k,) [s]; before the first, NaN and infinite."""
         now = time.monotonic() if now is None else now
-        fresh = 0
-        for _ in range(1000):  # a flood must not hold the loop
-            try:
-                data, sender = self._socket.recvfrom(65536)
-            except BlockingIOError:
-                break
-            except OSError:  # e.g. an ICMP error that a datagram of ours has caused
-                continue
-            fresh += self._take(data, sender, now)
-        if fresh:
-            self.counts.used += 1
-            self.counts.skipped += fresh - 1
+        self.listen(now)
         newest = self._newest
         if newest is None:
             return np.full(self.count, np.nan), np.full(self.count, np.inf)
-        silence = now - self._arrived
+        if not self._told:
+            self._told = True
+            self.counts.used += 1
+            if now - self._arrived < NEW:
+                self._arrived = now
+        silence = max(now - self._arrived, 0.0)
         if newest.ages is None:
             return newest.values, np.full(self.count, silence)
         # silence adds to what was sent, but never makes an age possible that was not
         sent = newest.ages
         return newest.values, np.where(sent < -CLOCK_ERROR, sent, silence + np.maximum(sent, 0.0))
 
-    def _take(self, data: bytes, sender: tuple[str, int], now: float) -> int:
-        restarted = now - self._arrived > self.RESTART_AFTER
+    def listen(self, now: float | None = None) -> None:
+        """Take in what has come, so that the system need not drop what comes next; for when nobody reads.
+
+        Args:
+            now: As for `read`, of the same clock [s].
+        """
+        now = time.monotonic() if now is None else now
+        self._waits.look()
+        for _ in range(1000):  # a flood must not hold the loop
+            try:
+                data, sender, arrived = receive(self._socket, 65536)
+            except BlockingIOError:
+                self._waits.emptied()
+                break
+            except OSError:  # e.g. an ICMP error that a datagram of ours has caused
+                continue
+            self._take(data, sender, now - self._waits.of(arrived))
+
+    def _take(self, data: bytes, sender: tuple[str, int], arrived: float) -> None:
+        restarted = arrived - self._arrived > self.RESTART_AFTER
         if self._host not in (None, sender[0]) or not (restarted or self._port == sender[1]):
             self.counts.strangers += 1
             self.refusal = f"{sender[0]}:{sender[1]} is not the sender of the distances"
-            return 0
+            return
         found = decode(data, self.count)
         if found is None:
             self.counts.rejected += 1
             self.refusal = f"{counted(len(data), 'byte')}, no sampling of {counted(self.count, 'spot')}"
-            return 0
+            return
         if self._newest is not None and not restarted and not 0 < (found.seq - self._newest.seq) % 2**32 < 2**31:
             self.counts.stale += 1
-            return 0
+            return
         self._host, self._port = sender  # the first one is the one
-        self._newest, self._arrived = found, now
-        return 1
+        self.counts.skipped += self._newest is not None and not self._told
+        self._newest, self._arrived, self._told = found, arrived, False
 
 
 class SensorOutput:
@@ -193,10 +219,13 @@ class SensorOutput:
     Args:
         host: Where the loop listens.
         port: Its port.
+
+    Raises:
+        ConfigurationError: The host has no address, or the port is none.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = DEFAULT_PORT) -> None:
-        self._address = host, port
+        self._address = host_address("SensorOutput", "host", host), udp_port("SensorOutput", port, least=1)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._seq = 0
 

@@ -8,7 +8,6 @@ The session decides what the robot may be sent; the supervisor decides whether i
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.irc5.kinds import flag, of_kind
 from qpsafe.irc5.messages import RobotPacket
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
 from qpsafe.irc5.supervisor import State, StopCategory, Supervisor
+from qpsafe.text.given import number, whole
 from qpsafe.tick import BAD_INPUT, FAULT, Tick
 
 if TYPE_CHECKING:
@@ -44,6 +45,10 @@ class LoopRules:
         settle: How long a pose at rest is sent before falling silent [s].
         manual: Whether also a stop that the robot itself made needs an acknowledgement here; else its own start, by
             the robot's rules, counts as one.
+
+    Raises:
+        ConfigurationError: A time is no finite number > 0, the number of ticks not whole or < 1, or `manual` neither
+            True nor False.
     """
 
     silence: float = 0.1
@@ -52,10 +57,10 @@ class LoopRules:
     manual: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("silence", "bad_ticks", "settle"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ConfigurationError("LoopRules", name, value, "a finite number > 0")
+        for name in ("silence", "settle"):
+            number("LoopRules", name, getattr(self, name), "a finite number > 0", above=0.0)
+        whole("LoopRules", "bad_ticks", self.bad_ticks, "a whole number, 1 to 10^9", 1, 10**9)
+        flag("LoopRules", "manual", self.manual)
 
 
 class StreamLoop:
@@ -68,7 +73,8 @@ class StreamLoop:
         rules: When to stop.
 
     Raises:
-        ConfigurationError: A joint slides, while the wire has angles; or more silence is borne than by the session.
+        ConfigurationError: A joint slides, while the wire has angles; or more silence is borne than by the session; or
+            an argument is something else.
 
     Attributes:
         tick: Of the controller, the last one; None before.
@@ -83,6 +89,9 @@ class StreamLoop:
         supervisor: Supervisor | None = None,
         rules: LoopRules | None = None,
     ) -> None:
+        if not (hasattr(controller, "robot") and callable(getattr(controller, "step", None))):
+            raise ConfigurationError("StreamLoop", "controller", controller, "a SafetyController")
+        of_kind("StreamLoop", "session", session, EgmSession)
         robot = controller.robot
         if robot.sliding.any():
             which = [name for name, slides in zip(robot.joint_names, robot.sliding, strict=True) if slides]
@@ -90,6 +99,8 @@ class StreamLoop:
         self.controller, self.session = controller, session
         self.supervisor = Supervisor() if supervisor is None else supervisor
         self.rules = LoopRules() if rules is None else rules
+        of_kind("StreamLoop", "supervisor", self.supervisor, Supervisor)
+        of_kind("StreamLoop", "rules", self.rules, LoopRules)
         most = session.rules.silence
         if self.rules.silence > most:  # the robot would be held after that all the same, as one that was started anew
             expected = f"at most the session's, {most:g} s: a packet after that is a new start"

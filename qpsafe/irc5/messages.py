@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import QpsafeError
+from qpsafe.errors import ConfigurationError, QpsafeError
 from qpsafe.extras import require
 from qpsafe.irc5.transport.axes import Axes, axes_of
+from qpsafe.text.given import number, numbers, one_of, whole
+from qpsafe.text.words import counted
 
 require("irc5", "EGM", "google.protobuf")
 _wire: Any = import_module("qpsafe.irc5.qpsafe_egm_pb2")
@@ -29,6 +31,8 @@ MAX_SIZE = 4096
 GARBAGE, WRONG_KIND, INCOMPLETE = "garbage", "wrong_kind", "incomplete"
 WRONG_JOINT_COUNT, NOT_FINITE = "wrong_joint_count", "not_finite"
 REASONS = (GARBAGE, WRONG_KIND, INCOMPLETE, WRONG_JOINT_COUNT, NOT_FINITE)
+
+_CLOCK = "a time on the robot's clock, 0 to 2^63 [s], or None"
 
 #: Words for the states of motion control (MCI) and of the RAPID program, by their number on the wire.
 MCI_STATES = ("undefined", "error", "stopped", "running")
@@ -93,13 +97,16 @@ class SensorPacket:
 
 
 def encode_robot(packet: RobotPacket, axes: Axes | None = None) -> bytes:
-    """An EgmRobot datagram. Numbers are not checked: a simulated robot may send what it likes.
+    """An EgmRobot datagram. Joint values are not checked: a simulated robot may send what it likes.
 
     Args:
         packet: What it says.
         axes: Which joints are external; by default those from the seventh on.
+
+    Raises:
+        ConfigurationError: Something of it cannot be put into a datagram.
     """
-    axes = axes_of(len(packet.q)) if axes is None else axes
+    axes = _check_sayable(packet, axes)
     message = _wire.EgmRobot()
     _set_header(message.header, packet.seq, packet.time_ms, _wire.EgmHeader.DATA)
     axes.write(message.feedBack, packet.q * axes.to_wire)
@@ -111,7 +118,7 @@ def encode_robot(packet: RobotPacket, axes: Axes | None = None) -> bytes:
     message.motorState.state = _wire.EgmMotorState.ON if packet.motors_on else _wire.EgmMotorState.OFF
     message.mciState.state = MCI_STATES.index(packet.mci)
     message.rapidExecState.state = RAPID_STATES.index(packet.rapid)
-    message.mciConvergenceMet = packet.converged
+    message.mciConvergenceMet = bool(packet.converged)
     return message.SerializeToString()
 
 
@@ -123,11 +130,12 @@ def decode_robot(data: bytes, n: int | Axes) -> RobotPacket:
     Raises:
         MalformedPacket: It is none, or its joint values cannot be used.
     """
+    axes = _axes("decode_robot", n)
     message = _parse(_wire.EgmRobot(), data)
     _check_header(message, _wire.EgmHeader.DATA)
     feedback = message.feedBack
     clock = (feedback.time.sec * 1_000_000 + feedback.time.usec) / 1e6 if _timed(feedback) else None
-    axes, planned = axes_of(n) if isinstance(n, int) else n, message.planned
+    planned = message.planned
     return RobotPacket(
         seq=message.header.seqno,
         time_ms=message.header.tm,
@@ -167,9 +175,10 @@ def decode_sensor(data: bytes, n: int | Axes) -> SensorPacket:
     Raises:
         MalformedPacket: It is none, or its joint values cannot be used.
     """
+    axes = _axes("decode_sensor", n)
     message = _parse(_wire.EgmSensor(), data)
     _check_header(message, _wire.EgmHeader.CORRECTION)
-    axes, speeds = axes_of(n) if isinstance(n, int) else n, message.speedRef
+    speeds = message.speedRef
     return SensorPacket(
         seq=message.header.seqno,
         time_ms=message.header.tm,
@@ -178,8 +187,36 @@ def decode_sensor(data: bytes, n: int | Axes) -> SensorPacket:
     )
 
 
+def _check_sayable(packet: RobotPacket, axes: Axes | None) -> Axes:
+    """The axes, if all of a packet can be put into a datagram."""
+    where = "RobotPacket"
+    for key in ("seq", "time_ms"):
+        whole(where, key, getattr(packet, key), "a whole number", -(2**63), 2**63)
+    one_of(where, "mci", packet.mci, MCI_STATES)
+    one_of(where, "rapid", packet.rapid, RAPID_STATES)
+    for key in ("motors_on", "converged"):
+        if not isinstance(getattr(packet, key), bool | np.bool_):
+            raise ConfigurationError(where, key, getattr(packet, key), "True or False")
+    if packet.clock is not None and not number(where, "clock", packet.clock, _CLOCK, 0.0) < 2.0**63:
+        raise ConfigurationError(where, "clock", packet.clock, _CLOCK)
+    q = numbers(where, "q", packet.q, "joint values, one a joint")
+    found = axes_of(q.size) if axes is None else _axes("encode_robot", axes)
+    expected = f"values of {counted(found.n, 'joint')}"
+    planned = q if packet.q_planned is None else numbers(where, "q_planned", packet.q_planned, expected)
+    for key, values in (("q", q), ("q_planned", planned)):
+        if values.shape != (found.n,):
+            raise ConfigurationError(where, key, getattr(packet, key), expected)
+    return found
+
+
+def _axes(where: str, n: int | Axes) -> Axes:
+    if isinstance(n, Axes):
+        return n
+    return axes_of(whole(where, "n", n, "a number of joints, 0 to 255, or Axes", 0, 255))
+
+
 def _set_header(header: Any, seq: int, time_ms: int, kind: int) -> None:
-    header.seqno, header.tm, header.mtype = seq % WRAP, time_ms % WRAP, kind
+    header.seqno, header.tm, header.mtype = int(seq) % WRAP, int(time_ms) % WRAP, kind
 
 
 def _parse(message: Any, data: bytes) -> Any:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import number, whole
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class SessionRules:
         margin: How far outside its limits a measured joint can be believed to be [rad].
 
     Raises:
-        ConfigurationError: A figure is not finite or not positive.
+        ConfigurationError: A figure is not finite or not positive, or `most_missed` is no whole number.
     """
 
     ramp_in: float = 0.5
@@ -40,9 +39,8 @@ class SessionRules:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-            if not (number and np.isfinite(value) and value > 0):
-                raise ConfigurationError("SessionRules", field.name, value, "a finite number > 0")
+            if field.name != "most_missed":
+                number("SessionRules", field.name, getattr(self, field.name), "a finite number > 0", above=0.0)
+        whole("SessionRules", "most_missed", self.most_missed, "a whole number, 1 to 2^31 - 1", 1, 2**31 - 1)
         if not self.catch_up <= 1.0:
             raise ConfigurationError("SessionRules", "catch_up", self.catch_up, "a fraction <= 1")

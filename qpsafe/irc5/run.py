@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from qpsafe.irc5.distances import SensorInput
+from qpsafe.irc5.kinds import of_kind, to_call
 from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.process.latency import Latency
 from qpsafe.irc5.process.realtime import resident
@@ -16,6 +17,7 @@ from qpsafe.irc5.process.requests import Requests
 from qpsafe.irc5.process.watchdog import Watchdog
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.supervisor import State, StopCategory
+from qpsafe.text.given import number
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]
@@ -95,7 +97,14 @@ def run_stream(
         on_events: Called with names of events before the answer of their tick is sent.
         on_second: Called about once a second, whether the robot speaks or not.
         clock: Tells the time [s].
+
+    Raises:
+        ConfigurationError: An argument is of another kind; before anything is sent.
     """
+    _check(sensors, duration, patience)
+    for key, value in {"on_tick": on_tick, "on_events": on_events, "on_second": on_second}.items():
+        if value is not None:
+            to_call("run_stream", key, value)
     run, requests = StreamRun(), Requests() if requests is None else requests
     watched = [*helpers] if watchdog is None else [watchdog.trouble, *helpers]
     heard = first = second = clock()
@@ -113,6 +122,8 @@ def run_stream(
         while True:
             cycle = streamer.wait(WAIT)
             now = clock()
+            if sensors is not None:  # also while the robot is silent: else the system drops what is new
+                sensors.listen(now)
             if watchdog is not None:
                 watchdog.beat()
                 if watchdog.asked > 0.0:
@@ -174,6 +185,15 @@ def run_stream(
     if loop.supervisor.state is not State.STOPPED:
         loop.supervisor.standstill("the stream has ended" if run.at_rest else "the stream has ended: nobody listens")
     return run
+
+
+def _check(sensors: SensorInput | None, duration: float | None, patience: float) -> None:
+    if sensors is not None:
+        of_kind("run_stream", "sensors", sensors, SensorInput)
+    if duration is not None:
+        number("run_stream", "duration", duration, "a finite time >= 0 [s], or None", 0.0)
+    if not (isinstance(patience, float) and patience == math.inf):
+        number("run_stream", "patience", patience, "a time > 0 [s]", above=0.0)
 
 
 def _last_resort(streamer: EgmStreamer, loop: StreamLoop, watchdog: Watchdog | None) -> None:

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.cycle import Cycle, Phase
+from qpsafe.irc5.kinds import of_kind
 from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
+from qpsafe.irc5.transport.addresses import peer_address
 from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.irc5.transport.inbox import Arrival, Inbox, Sender
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
+from qpsafe.text.given import parts
 from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
@@ -31,7 +34,7 @@ class EgmSession:
     Args:
         limits: Of the joints; no answer that moves the robot goes beyond them, whatever the source of references does.
         rules: How to ramp, and what counts as wrong.
-        peer: Address of the robot; by default that of the first valid packet.
+        peer: Address of the robot, or its name; by default that of the first valid packet.
         joint_names: For the reports.
         axes: Which joints are external; by default those from the seventh on.
 
@@ -43,7 +46,8 @@ class EgmSession:
         q, qd: The reference last answered (n,) [rad, rad/s].
 
     Raises:
-        ConfigurationError: Limits are no JointLimits, or names or axes are not those of as many joints.
+        ConfigurationError: Limits or rules are none, the peer has no address, or names or axes are not those of as many
+            joints.
     """
 
     def __init__(
@@ -54,18 +58,21 @@ class EgmSession:
         joint_names: Sequence[str] | None = None,
         axes: Axes | None = None,
     ) -> None:
-        if not isinstance(limits, JointLimits):
-            raise ConfigurationError("EgmSession", "limits", limits, "a JointLimits")
+        of_kind("EgmSession", "limits", limits, JointLimits)
         self.limits = limits
         self.rules = SessionRules() if rules is None else rules
+        of_kind("EgmSession", "rules", self.rules, SessionRules)
         self.n = len(limits.lower)
-        self.names = tuple(joint_names or (f"joint_{i + 1}" for i in range(self.n)))
-        if len(self.names) != self.n:
+        names = [f"joint_{i + 1}" for i in range(self.n)] if joint_names is None else joint_names
+        self.names = parts("EgmSession", "joint_names", names, f"{self.n} names")
+        if len(self.names) != self.n or not all(isinstance(name, str) for name in self.names):
             raise ConfigurationError("EgmSession", "joint_names", joint_names, f"{self.n} names")
         self.axes = axes_of(self.n) if axes is None else axes
+        of_kind("EgmSession", "axes", self.axes, Axes)
         if self.axes.n != self.n:
             raise ConfigurationError("EgmSession", "axes", self.axes.n, f"axes of {counted(self.n, 'joint')}")
-        self.inbox = Inbox(limits.lower, limits.upper, self.rules, peer, self.axes)
+        known = None if peer is None else peer_address(peer, "EgmSession")
+        self.inbox = Inbox(limits.lower, limits.upper, self.rules, known, self.axes)
         self.counts: Counter[str] = self.inbox.counts
         self.phase = Phase.WAITING
         self.causes: tuple[str, ...] = ()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import select
 import socket
-import struct
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.messages import DEFAULT_PORT, MAX_SIZE
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
+from qpsafe.irc5.transport.addresses import interface_address, peer_address, udp_port
 from qpsafe.irc5.transport.arrival import ask_for_times, receive
 from qpsafe.irc5.transport.axes import Axes
 from qpsafe.limits import JointLimits
@@ -71,18 +71,14 @@ class EgmStreamer:
     ) -> None:
         known = None if peer is None else peer_address(peer)
         self.session = EgmSession(limits, rules, known, joint_names, axes)
-        if not (isinstance(port, int) and 0 <= port < 65536):
-            raise ConfigurationError("EgmStreamer", "port", port, "a UDP port, 0 to 65535")
+        where = interface_address(host), udp_port("EgmStreamer", port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind((interface_address(host), port))
+            self._socket.bind(where)
         except OSError as error:
             self._socket.close()
             found = f"{host}:{port}"
             raise ConfigurationError("EgmStreamer", "host", found, f"an address to listen at ({error})") from None
-        except ConfigurationError:
-            self._socket.close()
-            raise
         self._socket.setblocking(False)
         self.address: tuple[str, int] = self._socket.getsockname()
         self.stamped = ask_for_times(self._socket)
@@ -186,52 +182,3 @@ class EgmStreamer:
                 continue
             if self.session.offer(data, sender, now) and self._arrived == 0:
                 self._arrived = arrived
-
-
-def interface_address(host: str) -> str:
-    """The IPv4 address of a host name or address of this computer, or of one of its network interfaces by name.
-
-    Raises:
-        ConfigurationError: There is none, or it stands for all interfaces.
-    """
-    expected = "an address of this computer, or one of its interfaces: "
-    names = [name for _, name in socket.if_nameindex()]
-    if host in names:
-        import fcntl  # not on Windows, where interfaces are given by address
-
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            request = struct.pack("256s", host.encode()[:15])
-            try:
-                answer = fcntl.ioctl(probe.fileno(), 0x8915, request)  # SIOCGIFADDR
-            except OSError as error:
-                raise ConfigurationError(
-                    "EgmStreamer", "host", host, f"an interface with an address ({error})"
-                ) from None
-        return socket.inet_ntoa(answer[20:24])
-    address = _found(host)
-    if address is None:
-        raise ConfigurationError("EgmStreamer", "host", host, expected + ", ".join(names))
-    return address
-
-
-def peer_address(peer: str) -> str:
-    """The IPv4 address of a host name or address, as packets from there bear it.
-
-    Raises:
-        ConfigurationError: There is none, or it is that of nobody: all packets would be a stranger's.
-    """
-    address = _found(peer)
-    if address is None:
-        raise ConfigurationError(
-            "EgmStreamer", "peer", peer, "the robot's IPv4 address, e.g. 192.168.125.1, or its name"
-        )
-    return address
-
-
-def _found(name: str) -> str | None:
-    """The IPv4 address of a name or an address; None where there is none, or one of nobody or everybody."""
-    try:
-        address = socket.gethostbyname(name) if name else "0.0.0.0"
-    except (OSError, UnicodeError):
-        return None
-    return None if address in ("0.0.0.0", "255.255.255.255") else address

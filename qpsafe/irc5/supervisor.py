@@ -16,6 +16,9 @@ from collections.abc import Callable
 from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
+from qpsafe.irc5.kinds import to_call
+from qpsafe.text.given import whole
+
 
 class State(StrEnum):
     """States, in order of severity."""
@@ -131,6 +134,9 @@ class Supervisor:
         log: The last transitions.
         count: How many there have been.
         unheard: The last exception of `on_transition`, in words; empty without one.
+
+    Raises:
+        ConfigurationError: `clock` or `on_transition` cannot be called, or `keep` is no whole number >= 0.
     """
 
     def __init__(
@@ -139,6 +145,10 @@ class Supervisor:
         keep: int = 1000,
         on_transition: Callable[[Transition], None] | None = None,
     ) -> None:
+        to_call("Supervisor", "clock", clock)
+        if on_transition is not None:
+            to_call("Supervisor", "on_transition", on_transition)
+        keep = whole("Supervisor", "keep", keep, "a whole number, 0 to 10^9", 0, 10**9)
         self._clock, self._on_transition = clock, on_transition
         self.state = IDLE
         self.category: StopCategory | None = None

@@ -6,7 +6,6 @@ The person's own motion is not in it: the cap holds for what the robot adds.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.text.given import number, whole
 from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
@@ -56,13 +56,11 @@ class DangerBarrier(Fixed):
     def __init__(
         self, delta_max: float, horizon: float = 0.2, points: int = 3, field: DangerField | None = None
     ) -> None:
-        if not (math.isfinite(delta_max) and delta_max > 0.0):
-            raise ConfigurationError("DangerBarrier", "delta_max", delta_max, "a finite number > 0")
-        if not (math.isfinite(horizon) and horizon >= 0.0):
-            raise ConfigurationError("DangerBarrier", "horizon", horizon, "a finite time >= 0 [s]")
-        if not points >= 1:
-            raise ConfigurationError("DangerBarrier", "points", points, "at least 1")
-        self.delta_max, self.horizon, self.points = float(delta_max), float(horizon), int(points)
+        self.delta_max = number("DangerBarrier", "delta_max", delta_max, "a finite number > 0", above=0.0)
+        self.horizon = number("DangerBarrier", "horizon", horizon, "a finite time >= 0 [s]", 0.0)
+        self.points = whole("DangerBarrier", "points", points, "a whole number, at least 1", 1)
+        if field is not None and (isinstance(field, type) or not callable(getattr(field, "evaluate", None))):
+            raise ConfigurationError("DangerBarrier", "field", field, "a DangerField")
         self.field = DangerField() if field is None else field
         self.__setstate__({})
 

@@ -20,14 +20,16 @@ def law_named(name: str, projection: str = "strict", solver: str | None = None) 
     Args:
         name: One of `LAWS`.
         projection: Of the hierarchical law, one of `PROJECTIONS`; other laws ignore it.
-        solver: Of the QPs; the law's default if None.
+        solver: Of the QPs; the law's default if None. The null-space law solves none.
 
     Raises:
-        ConfigurationError: There is none of this name.
+        ConfigurationError: There is none of this name, or it has no use for a solver.
     """
     if name == "hierarchical":
         return HierarchicalLaw(cast("Any", projection), solver=solver)  # which checks it
     if name == "nullspace":
+        if solver is not None:
+            raise ConfigurationError("law_named", "solver", solver, "none with the law nullspace: it solves no QP")
         return NullspaceLaw()
     if name == "weighted":
         return WeightedLaw(solver=solver)

@@ -22,6 +22,8 @@ from qpsafe.hqp.own.linear import Array
 #: μ [s] where nothing else is said: ten ticks of 4 ms; see docs/explanation/laws.md.
 DAMPING_TIME = 0.04
 _HUGE = 1e60
+#: Neither a damping nor its time may be larger: ε² would be beyond `_HUGE`.
+MOST = 1e30
 
 
 def threshold(square: float, gain: float, error: Array, time: float) -> tuple[float, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Sequence
 from typing import Any, Literal, get_args
 
@@ -17,8 +16,9 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solution import Solution
 from qpsafe.hqp.solve import require_solver, solve_hierarchy
-from qpsafe.laws.damping import DAMPING_TIME, threshold
+from qpsafe.laws.damping import DAMPING_TIME, MOST, threshold
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
+from qpsafe.text.given import number, one_of
 from qpsafe.text.words import call
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class HierarchicalLaw(Fixed):
             only. By default 0.04 where the projection is strict and the solver the own one, else 0, off.
 
     Raises:
-        ConfigurationError: Unknown projection, or a damping that is not a finite number >= 0.
+        ConfigurationError: Unknown projection or solver, or a damping that is not a finite number >= 0.
     """
 
     fixed = frozenset(("projection", "solver", "damping", "damping_time"))
@@ -64,17 +64,15 @@ class HierarchicalLaw(Fixed):
         damping: float = 0.0,
         damping_time: float | None = None,
     ) -> None:
+        require_solver(solver, "HierarchicalLaw")
+        one_of("HierarchicalLaw", "projection", projection, get_args(Projection))
         own = solver in (None, "own")
         if damping_time is None:
             damping_time = DAMPING_TIME if own and projection == "strict" else 0.0
-        if projection not in get_args(Projection):
-            raise ConfigurationError("HierarchicalLaw", "projection", projection, f"one of {get_args(Projection)}")
+        expected = f"a finite number >= 0, up to {MOST:g}"
         for key, value in (("damping", damping), ("damping_time", damping_time)):
-            if not 0.0 <= value < math.inf:
-                raise ConfigurationError("HierarchicalLaw", key, value, "a finite number >= 0")
-            if value > 0.0 and not own:
+            if number("HierarchicalLaw", key, value, expected, 0.0, most=MOST) > 0.0 and not own:
                 raise ConfigurationError("HierarchicalLaw", key, value, f"0 with solver {solver!r}")
-        require_solver(solver)
         self.projection = projection
         self.solver = solver
         # compile now if need be, not within the first tick

@@ -15,14 +15,29 @@ OTHER = -1
 
 
 def kind_of(law: Any, tasks: int) -> int:
-    """The number of a law with so many tasks."""
+    """The number of a law with so many tasks.
+
+    Raises:
+        ConfigurationError: It does not fit so many.
+    """
+    check_fit(law, tasks)
     if type(law) is NullspaceLaw:
         return NULLSPACE
     if type(law) not in (HierarchicalLaw, WeightedLaw) or law.solver not in (None, "own"):
         return OTHER
     if type(law) is HierarchicalLaw:
         return STRICT if law.projection == "strict" or tasks < 2 else PAPER
-    return WEIGHTED if law.weights is None or len(law.weights) == tasks + 1 else OTHER
+    return WEIGHTED
+
+
+def check_fit(law: Any, tasks: int) -> None:
+    """Refuse a law whose weights are not for so many tasks: it could answer no tick.
+
+    Raises:
+        ConfigurationError: Names the weights, or the ratio.
+    """
+    if isinstance(law, WeightedLaw):
+        law.importance(tasks)
 
 
 def numbers_of(law: Any, tasks: int) -> tuple[float, float, tuple[float, ...]]:

@@ -16,9 +16,13 @@ from qpsafe.fixed import Fixed
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import require_solver, solve_hierarchy
 from qpsafe.laws.problem import LawProblem, LawResult
+from qpsafe.text.given import number, numbers
 from qpsafe.text.words import call, counted
 
 Array = NDArray[np.float64]
+
+#: Weights beyond it, or below its reciprocal, leave the solver nothing to weigh.
+HEAVIEST = 1e100
 
 
 class WeightedLaw(Fixed):
@@ -33,19 +37,17 @@ class WeightedLaw(Fixed):
         weights: w_1, ..., w_N, w_E themselves, instead of the ratio; > 0.
 
     Raises:
-        ConfigurationError: The ratio is not a finite number > 1, a weight not a finite number > 0.
+        ConfigurationError: The ratio is not a number > 1, a weight not a number > 0, or it is beyond `HEAVIEST`; or
+            there is no such solver.
     """
 
     fixed = frozenset(("ratio", "solver", "weights"))
 
     def __init__(self, ratio: float = 1e3, solver: str | None = None, weights: Sequence[float] | None = None) -> None:
-        if not (math.isfinite(ratio) and ratio > 1.0):
-            raise ConfigurationError("WeightedLaw", "ratio", ratio, "a finite number > 1")
-        if weights is not None and not (len(weights) > 0 and all(0.0 < w < math.inf for w in weights)):
-            raise ConfigurationError("WeightedLaw", "weights", weights, "finite numbers > 0: w_1, ..., w_N, w_E")
-        require_solver(solver)
-        self.ratio = ratio
-        self.weights = None if weights is None else tuple(map(float, weights))
+        expected = f"a number > 1, up to {HEAVIEST:g}"
+        self.ratio = number("WeightedLaw", "ratio", ratio, expected, above=1.0, most=HEAVIEST)
+        self.weights = None if weights is None else _checked_weights(weights)
+        require_solver(solver, "WeightedLaw")
         self.solver = solver
         if solver in (None, "own"):
             import qpsafe.hqp.own.solver  # noqa: F401  compile it now if need be, not within the first tick
@@ -58,14 +60,17 @@ class WeightedLaw(Fixed):
         """w_1, ..., w_N, w_E for so many tasks.
 
         Raises:
-            ConfigurationError: The law was given weights for another number of tasks.
+            ConfigurationError: The law was given weights for another number of tasks, or a ratio too large for so many.
         """
-        weights = self.weights or tuple(self.ratio ** (count - k) for k in range(count + 1))
-        if len(weights) != count + 1:
-            raise ConfigurationError(
-                "WeightedLaw", "weights", weights, f"{count + 1} of them for {counted(count, 'task')}"
-            )
-        return weights
+        if self.weights is None:
+            if self.ratio > HEAVIEST ** (1.0 / max(count, 1)):
+                expected = f"one whose power of {count}, for {counted(count, 'task')}, is at most {HEAVIEST:g}"
+                raise ConfigurationError("WeightedLaw", "ratio", self.ratio, expected)
+            return tuple(self.ratio ** (count - k) for k in range(count + 1))
+        if len(self.weights) != count + 1:
+            expected = f"{count + 1} of them for {counted(count, 'task')}"
+            raise ConfigurationError("WeightedLaw", "weights", self.weights, expected)
+        return self.weights
 
     def solve(self, problem: LawProblem) -> LawResult:
         """Solve one tick; see `LawProblem` for shapes."""
@@ -79,6 +84,14 @@ class WeightedLaw(Fixed):
         level = Level(matrix, target, target)
         solution = solve_hierarchy([*problem.soft, level], problem.lower, problem.upper, solver=self.solver)
         return LawResult(solution.qd, solution.status, ((1.0, solution),))
+
+
+def _checked_weights(weights: Any) -> tuple[float, ...]:
+    expected = f"numbers from {1.0 / HEAVIEST:g} to {HEAVIEST:g}: w_1, ..., w_N, w_E"
+    given = numbers("WeightedLaw", "weights", weights, expected, ndim=1)
+    if not (len(given) > 0 and ((given >= 1.0 / HEAVIEST) & (given <= HEAVIEST)).all()):
+        raise ConfigurationError("WeightedLaw", "weights", weights, expected)
+    return tuple(given.tolist())
 
 
 def into_one(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +17,13 @@ from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.laws.kinds import check_fit
 from qpsafe.laws.problem import Law, LawResult
-from qpsafe.limits import KINDS, Box, JointLimits
+from qpsafe.limits import KINDS, SHORTEST_TICK, Box, JointLimits
 from qpsafe.recovery.returns import RecoveryRules
 from qpsafe.sensing.detection import reals
 from qpsafe.tasks.task import Task
+from qpsafe.text.given import number
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -66,10 +67,8 @@ def checked_activation(tasks: tuple[Task, ...], activation: Activation | None, r
 
 def checked_dt(where: str, dt: float) -> float:
     """A tick as a float."""
-    number = isinstance(dt, Real) and not isinstance(dt, bool | np.bool_)
-    if not (number and 0.0 < float(dt) <= LONGEST_TICK):  # false for NaN
-        raise ConfigurationError(where, "dt", dt, f"a time in seconds, above 0, up to {LONGEST_TICK}; 4 ms is 0.004")
-    return float(dt)
+    expected = f"a time in seconds, above 0 (from {SHORTEST_TICK:g}), up to {LONGEST_TICK}; 4 ms is 0.004"
+    return number(where, "dt", dt, expected, SHORTEST_TICK, most=LONGEST_TICK)
 
 
 def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> tuple[str, ...]:
@@ -91,6 +90,8 @@ def check_tasks(robot: Robot, tasks: Sequence[Task], dt: float) -> tuple[str, ..
         if not task.gain * dt < 1.0:
             expected = f"less than 1/dt = {1.0 / dt:g} for a stable loop"
             raise ConfigurationError("SafetyController", f"tasks[{k}].gain", task.gain, expected)
+    for task in tasks:
+        task.settle()
     return tuple(task.label for task in tasks)
 
 
@@ -101,10 +102,12 @@ def checked_robot(where: str, robot: Robot) -> Robot:
     return robot
 
 
-def checked_law(law: Law) -> Law:
-    """`law`, if it can be asked."""
+def checked_law(law: Law, tasks: int | None = None) -> Law:
+    """`law`, if it can be asked, and fits as many tasks, where that is known."""
     if isinstance(law, type) or not callable(getattr(law, "solve", None)):
         raise ConfigurationError("SafetyController", "law", law, "a law with solve(problem), e.g. HierarchicalLaw()")
+    if tasks is not None:
+        check_fit(law, tasks)
     return law
 
 

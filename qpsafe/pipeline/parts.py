@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.separation_limit import SeparationLevel, SeparationLimit, oldest
+from qpsafe.errors import ConfigurationError
 from qpsafe.gate.pack import surroundings
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.geometry.clearance import ClearanceLimit, checked_clearance
@@ -44,6 +46,9 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
+
+
+_users: WeakKeyDictionary[Evasion, ref[Parts]] = WeakKeyDictionary()  # who remembers its motion in which evasion
 
 
 class Parts(Sensors):
@@ -97,7 +102,7 @@ class Parts(Sensors):
 
     @law.setter
     def law(self, law: Law) -> None:
-        self._law = checked_law(law)
+        self._law = checked_law(law, len(self._tasks))
 
     @property
     def field(self) -> Any:
@@ -128,7 +133,13 @@ class Parts(Sensors):
 
     @evasion.setter
     def evasion(self, evasion: Evasion | str | None) -> None:
-        self._evasion = checked_evasion(evasion, self._robot, self._dt)
+        found = checked_evasion(evasion, self._robot, self._dt)
+        other = _users.get(found, lambda: None)()
+        if other not in (None, self) and other._evasion is found:  # one would be moved by what the other one sees
+            raise ConfigurationError(
+                "SafetyController", "evasion", evasion, "one of its own: another controller has it"
+            )
+        self._evasion, _users[found] = found, ref(self)
 
     @property
     def limits(self) -> JointLimits | Literal["off"]:
@@ -200,7 +211,8 @@ class Parts(Sensors):
     def set_tasks(self, tasks: Sequence[Task], activation: Activation | None = None, *, restart: bool = False) -> None:
         """Redefine or reorder the tasks, from the next tick on; the command goes on inside the limits.
 
-        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension.
+        Where the robot is not on the new tasks' trajectories, it is led there as after a suspension. A law with weights
+        for another number of tasks has to make way for one without any before.
 
         Args:
             tasks: What it is asked to do now, highest priority first.
@@ -211,6 +223,7 @@ class Parts(Sensors):
             ConfigurationError: Names the argument that is wrong; the tasks are then as they were.
         """
         labels = check_tasks(self._robot, tasks, self._dt)
+        checked_law(self._law, len(tasks))
         if activation is None and len(tasks) == len(self._tasks):
             activation = self._activation
         activation = checked_activation(tuple(tasks), activation, self._robot)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from qpsafe.danger.activation import Activation, Switching
+from qpsafe.errors import QpsafeError
 from qpsafe.pipeline.parts import Parts
 from qpsafe.recovery.recovery import Recovery
 from qpsafe.recovery.stall import StallWatch
@@ -21,6 +24,33 @@ class Running(Parts):
     _seq: int
     _active: bool
     _q: NDArray[np.float64]
+
+    _at_work = False
+
+    def _enter(self) -> Any:
+        """Begin a tick; returns the clocks of the path, to set them back.
+
+        Raises:
+            QpsafeError: One is being made: it would be integrated twice.
+        """
+        if self._at_work:
+            raise QpsafeError("a tick is being made: `step` was called by one of its own parts, or by another thread")
+        self._at_work = True
+        return self._recovery.clocks
+
+    def _switching(self, cdf_n: float) -> Switching:
+        """Switches (19), (21), activations and regime; of a class of the user's, checked.
+
+        Raises:
+            ValueError: They are none.
+        """
+        found = self._activation.at(cdf_n)
+        if type(self._activation).at is Activation.at:
+            return found
+        falling = all(above >= a for above, a in pairwise((1.0, *found[1], 0.0)))  # false for NaN
+        if not (falling and len(found[1]) == len(self._tasks)):
+            raise ValueError(f"the activations are {found[1]}, expected 1 >= a_1 >= ... >= 0, one a task")
+        return found
 
     def reset(self) -> None:
         """Start anew: the next valid measurement sets the commanded configuration."""

@@ -49,7 +49,8 @@ class Sensors:
         self._spots = checked_spots(spots, robot)
         self._rules = SensingRules(**dict(robot.tuned.sensing)) if rules is None else rules
         check_surroundings(robot, self._rules, known, carried)
-        self._known, self._carried = tuple(known), carried
+        self._known = tuple(known)
+        self._carried = carried = None if carried is None else {frame: tuple(it) for frame, it in carried.items()}
         self._sensing = self._ranging = None
         if self._spots is not None:
             self._sensing = DistanceSensing(robot, self._spots, self._dt, self._rules, known, carried)

@@ -10,6 +10,7 @@ import numpy as np
 
 from qpsafe.placement.candidates import Candidates
 from qpsafe.text.json_text import json_text
+from qpsafe.text.whole_file import whole_file
 
 
 def spots_toml(candidates: Candidates, chosen: Sequence[int], remark: str) -> str:
@@ -62,12 +63,8 @@ def write_spots(path: Path, candidates: Candidates, chosen: Sequence[int], remar
         chosen: Which of them carry a spot.
         remark: First comment in the file.
     """
-    part = path.with_name("." + path.name + ".part")
-    try:
+    with whole_file(path) as part:
         part.write_text(spots_toml(candidates, chosen, remark), encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _vector(values: np.ndarray, digits: int) -> str:

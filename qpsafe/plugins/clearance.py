@@ -15,7 +15,7 @@ from qpsafe.geometry.solids import Solids
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.limits import JointLimits
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import OnRobot, same_tick, updated
+from qpsafe.plugins.rows import OnRobot, checked_prefix, same_tick, updated
 from qpsafe.sensing.hulls import Obstacle
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class ClearanceRows(OnRobot):
         """
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("ClearanceLimit", "danger", danger, "a DangerMonitor")
-        self.danger, self.robot, self.prefix = danger, danger.robot, prefix
+        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("ClearanceLimit", prefix)
         self.clearance = ClearanceLimit(danger.robot, Solids.of(danger.robot, known, carried), margin)
         self._limits = JointLimits.of(danger.robot, danger.dt) if danger.limits is None else danger.limits
 

@@ -7,7 +7,6 @@ product of the two errors. Gains: α per tick against K per second, K = α / dt.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.problem import TaskVelocity
+from qpsafe.pipeline.checks import checked_dt
 from qpsafe.plugins.joints import JointMap
 from qpsafe.plugins.rows import ClikRows, checked_cost
 from qpsafe.robot.robot import Robot
@@ -148,8 +148,7 @@ def posture_of(task: Task) -> tuple[Array, Array | None] | None:
 
 def rate(gain: float, dt: float) -> float:
     """K = α / dt [1/s]."""
-    if not (math.isfinite(dt) and dt > 0.0):
-        raise ConfigurationError("conversion", "dt", dt, "a finite time > 0 [s]")
+    dt = checked_dt("conversion", dt)
     if not gain > 0.0:
         raise ConfigurationError("conversion", "gain", gain, "more than 0")
     return gain / dt

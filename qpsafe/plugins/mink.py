@@ -15,7 +15,7 @@ from qpsafe.geometry.clearance import MARGIN
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, mujoco_joints
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, release
+from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, checked_priority, release
 from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
@@ -92,10 +92,9 @@ class ReleasableTask(mink.tasks.BaseTask):  # type: ignore[misc]
     """
 
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
-        count = len(danger.activation.levels)
-        if not 1 <= priority <= count:
-            raise ConfigurationError("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold")
-        self.task, self.danger, self.priority = task, danger, priority
+        if not isinstance(task, mink.tasks.BaseTask):
+            raise ConfigurationError("ReleasableTask", "task", task, "one of mink's tasks")
+        self.task, self.danger, self.priority = task, danger, checked_priority(danger, priority)
 
     def compute_qp_objective(self, configuration: Any) -> Any:
         """The task's objective times a_k / a_1."""

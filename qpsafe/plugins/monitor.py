@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +26,7 @@ from qpsafe.sensing.detection import (
     refuse_points,
 )
 from qpsafe.tasks.trajectory import checked_pose
+from qpsafe.text.given import number
 from qpsafe.tick import BAD_INPUT, OK
 
 Array = NDArray[np.float64]
@@ -75,15 +77,13 @@ class DangerMonitor:
         base: ArrayLike | None = None,
     ) -> None:
         self.robot, self.dt = checked_robot("DangerMonitor", robot), checked_dt("DangerMonitor", dt)
-        if not (math.isfinite(ramp) and ramp >= 0.0):
-            raise ConfigurationError("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]")
+        self.ramp = number("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]", 0.0)
         self.field = DangerField() if field is None else checked_field(field)
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
         if not isinstance(self.activation, Activation):
             raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
         self.evasion = checked_evasion(evasion, robot, self.dt)
         self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
-        self.ramp = float(ramp)
         self._base = None if base is None else checked_pose("DangerMonitor", "base", base)
         self.reset()
 
@@ -91,7 +91,7 @@ class DangerMonitor:
         """Forget the past: no points, no evasive velocity."""
         self.evasion.reset()
         self.ticks = 0
-        self._moving = np.zeros(self.robot.nq)
+        self._within = (np.zeros(self.robot.nq),) * 2  # lowest and highest velocity that it may have been sent last
         self._bad("not updated yet")
         self.status, self.message = OK, ""
         self._last = (1.0,) * len(self.switches)
@@ -113,6 +113,8 @@ class DangerMonitor:
         try:
             self._take(q, qd, points)
         except BadInput as problem:
+            with suppress(BadInput):  # without a velocity it is within what the limits last admitted
+                self._within = (as_joint_velocity(qd, self.robot),) * 2
             self._bad(str(problem))
             self.qd0 = self.evasion.step(np.zeros(self.robot.nq)).copy()  # what was known fades
 
@@ -133,12 +135,12 @@ class DangerMonitor:
         if not (np.isfinite(danger).all() and np.isfinite(torque).all()):
             raise BadInput("the danger of a detected point is not finite: joint values or points are out of all bounds")
         self.state: RobotState | None = state
-        self._moving = qd
         self.qd, self.points, self.danger = qd, points, danger
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
         self.qd0 = self.evasion.step(torque).copy()  # (16)
         self.box: Box | None = None if self.limits is None else self.limits.box(q, qd)
+        self._within = (qd, qd) if self.box is None else (self.box.lower, self.box.upper)
         self.status, self.message = OK, ""
 
     def _ramped(self, switches: tuple[float, ...]) -> tuple[float, ...]:
@@ -159,13 +161,19 @@ class DangerMonitor:
         self.state, self.qd, self.qd0 = None, np.zeros(n), np.zeros(n)
         self.points, self.danger, self.cdf_n = np.empty((0, 3)), np.empty(0), math.nan
         self.switches = self._last = (0.0,) * len(self.activation.levels)
-        if self.limits is not None:  # brake from the last speed that is known; whoever kept to the box can
-            most = self.limits.max_acceleration * self.dt
-            self._moving = self._moving - np.clip(self._moving, -most, most)
-        no_kind = np.zeros(n, dtype=np.int64)
-        pinned = Box(self._moving.copy(), self._moving.copy(), no_kind, no_kind, no_kind)
-        self.box = None if self.limits is None else pinned
+        self.box = None if self.limits is None else self._braking(self.limits.max_acceleration * self.dt)
         self.status, self.message = BAD_INPUT, message
+
+    def _braking(self, most: Array) -> Box:
+        """As near to rest as `most` (n,) allows in one tick, from whatever velocity the robot may have been sent last.
+
+        What a box admits is at most two such steps wide: one velocity is within a step of all of it.
+        """
+        lower, upper = self._within
+        slowest = np.minimum(np.maximum(0.0, upper - most), lower + most)
+        self._within = slowest, slowest
+        no_kind = np.zeros(len(slowest), dtype=np.int64)
+        return Box(slowest, slowest.copy(), no_kind, no_kind, no_kind)
 
 
 def _into(base: Array, points: ArrayLike) -> ArrayLike:

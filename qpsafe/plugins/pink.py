@@ -14,7 +14,7 @@ from qpsafe.geometry.clearance import MARGIN
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, pinocchio_joints
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, release
+from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, checked_priority, release
 from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
@@ -94,11 +94,10 @@ class ReleasableTask(PinkTask):  # type: ignore[misc]
     """
 
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
-        count = len(danger.activation.levels)
-        if not 1 <= priority <= count:
-            raise ConfigurationError("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold")
+        if not isinstance(task, PinkTask):
+            raise ConfigurationError("ReleasableTask", "task", task, "one of pink's tasks")
         super().__init__(cost=task.cost, gain=task.gain, lm_damping=task.lm_damping)
-        self.task, self.danger, self.priority = task, danger, priority
+        self.task, self.danger, self.priority = task, danger, checked_priority(danger, priority)
 
     def compute_error(self, configuration: Any) -> Array:
         """The task's own."""

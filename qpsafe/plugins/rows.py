@@ -16,16 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
+from qpsafe.pipeline.checks import checked_dt, checked_robot
 from qpsafe.plugins.joints import JointMap
 from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.tasks.task import Task
+from qpsafe.text.given import number, numbers, whole
 
 Array = NDArray[np.float64]
 
 #: m counts as at least this where a cost is divided by it: a released task keeps a millionth of the weight.
 LEAST = 1e-6
+#: No row may cost more: solvers square it.
+DEAREST = 1e100
 
 
 class OnRobot:
@@ -77,9 +81,8 @@ class EvasiveRows(OnRobot):
         """
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("EvasiveTask", "danger", danger, "a DangerMonitor")
-        if not (math.isfinite(against) and against >= 0.0):
-            raise ConfigurationError("EvasiveTask", "against", against, "a finite cost >= 0")
-        self.danger, self.robot, self.prefix, self.against = danger, danger.robot, prefix, float(against)
+        self.against = number("EvasiveTask", "against", against, f"a cost >= 0, up to {DEAREST:g}", 0.0, most=DEAREST)
+        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("EvasiveTask", prefix)
         self.cost = cost
 
     @property
@@ -124,12 +127,16 @@ class ClikRows(OnRobot):
             dt: Tick [s].
             prefix: What stands before the joints' names in the model.
         """
-        misfit = task.misfit(robot)
+        if not isinstance(task, Task):
+            raise ConfigurationError("ClikTask", "task", task, "a Task, e.g. PositionTask")
+        misfit = task.misfit(checked_robot("ClikTask", robot))
         if misfit is not None:
             raise ConfigurationError(type(task).__name__, misfit.key, misfit.value, misfit.expected)
-        if not (math.isfinite(dt) and 0.0 < dt * task.gain < 1.0):
+        dt = checked_dt("ClikTask", dt)
+        if not dt * task.gain < 1.0:
             raise ConfigurationError(type(task).__name__, "gain", task.gain, f"K dt between 0 and 1 with dt = {dt} s")
-        self.task, self.robot, self.dt, self.prefix, self.time = task, robot, float(dt), prefix, 0.0
+        self.prefix = checked_prefix("ClikTask", prefix)
+        self.task, self.robot, self.dt, self.time = task, robot, dt, 0.0
 
     def compute_error(self, configuration: Any) -> Array:
         """-(ẋ_d + K e) dt, (rows,)."""
@@ -168,7 +175,7 @@ class DangerRows(OnRobot):
         """
         if not isinstance(danger, DangerMonitor):
             raise ConfigurationError("DangerLimit", "danger", danger, "a DangerMonitor")
-        self.danger, self.robot, self.prefix = danger, danger.robot, prefix
+        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("DangerLimit", prefix)
         self.barrier = DangerBarrier(delta_max, horizon, points, danger.field)
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
@@ -210,7 +217,7 @@ class BoxRows(OnRobot):
             raise ConfigurationError("JointLimit", "danger", danger, "a DangerMonitor")
         if danger.limits is None:
             raise ConfigurationError("JointLimit", "danger.limits", "off", "a DangerMonitor with limits")
-        self.danger, self.robot, self.prefix = danger, danger.robot, prefix
+        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("JointLimit", prefix)
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array]:
         """(G, h) with G Δq <= h, two rows a joint."""
@@ -241,6 +248,19 @@ def same_tick(danger: DangerMonitor, dt: float, where: str) -> DangerMonitor:
     return danger
 
 
+def checked_priority(danger: DangerMonitor, priority: int) -> int:
+    """The priority of a task that danger releases, if the monitor has a threshold for it.
+
+    Args:
+        danger: The monitor.
+        priority: As given, from 1.
+    """
+    if not isinstance(danger, DangerMonitor):
+        raise ConfigurationError("ReleasableTask", "danger", danger, "a DangerMonitor")
+    count = len(danger.activation.levels)
+    return whole("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold", 1, count)
+
+
 def release(danger: DangerMonitor, priority: int) -> float:
     """a_k / a_1 = f ... of the task of priority k (from 1): how much of its weight is left against the first."""
     return math.prod(updated(danger).switches[1:priority])
@@ -254,11 +274,20 @@ def checked_cost(where: str, cost: ArrayLike, rows: int) -> Array:
         cost: As given.
         rows: How many there are.
     """
-    expected = f"a finite number >= 0, or {rows} of them"
-    try:
-        array = np.array(cost, dtype=float)
-    except (TypeError, ValueError):
-        raise ConfigurationError(where, "cost", cost, expected) from None
-    if array.shape not in ((), (1,), (rows,)) or not (np.isfinite(array).all() and (array >= 0.0).all()):
+    expected = f"a number from 0 to {DEAREST:g}, or {rows} of them"
+    array = numbers(where, "cost", cost, expected)
+    if array.shape not in ((), (1,), (rows,)) or not ((array >= 0.0) & (array <= DEAREST)).all():  # false for NaN
         raise ConfigurationError(where, "cost", cost, expected)
     return np.broadcast_to(array, rows).copy()
+
+
+def checked_prefix(where: str, prefix: str) -> str:
+    """What stands before names in a model, if it is text.
+
+    Args:
+        where: Who asks, for the error.
+        prefix: As given.
+    """
+    if not isinstance(prefix, str):
+        raise ConfigurationError(where, "prefix", prefix, 'text before names of the model, e.g. "arm_"; "" for none')
+    return prefix

@@ -90,14 +90,11 @@ class RangeSensing:
         self._foresight = Foresight(total)
         self._together: Together | None = None
         if count > 1 or self.rules.unseen == OCCUPIED:
+            running = self.rules.acceleration, self.rules.fastest
             self._together = Together(
-                self._reducers,
-                self.sensing.tolerance,
-                self.rules.deviations,
-                hulls,
-                self.sensing.approach_speed,
-                total,
-            )
+                self._reducers, self.sensing.tolerance, self.rules.deviations, hulls, self.sensing.approach_speed,
+                total, self._mounts, running,
+            )  # fmt: skip
         self._still = np.zeros((links * self.rules.each, 3))
         self._past = Configurations(robot.nq, float(self._patience.max()))
         self.most = int(np.floor(self.sensing.dead_share * (count + others) + 1e-9))
@@ -140,7 +137,7 @@ class RangeSensing:
         self._counts[:] = 0
         if self._together is not None:
             self._together.reset()
-        self._hidden_places, self._looked, self._hidden_at = _NONE, False, 0.0
+        self._hidden_places, self._looked, self._hidden_at = _NONE, True, -inf
         self._past.reset()
         self.inbox.reset()
         self.unseen: tuple[str, ...] = ()
@@ -206,7 +203,8 @@ class RangeSensing:
 
     def _hidden(self, now: float, state: RobotState, wire: Wire) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
-        if self.rules.unseen == OCCUPIED and self._looked and self._together is not None:
+        anew = self._looked or now - self._hidden_at > AGAIN  # the robot goes on where no image comes
+        if self.rules.unseen == OCCUPIED and anew and self._together is not None:
             places = self._together.unseen(wire, state.body_poses(), now)
             self._hidden_places, self._looked, self._hidden_at = places, False, now
         return self._hidden_places
@@ -251,7 +249,7 @@ class RangeSensing:
                 velocities = self._tracks[who](given.stamp, around, None if fixed else pose)[:count]
             self._renew(who, given.stamp, count, shown.seen, velocities)
             if self._together is not None:
-                self._together.take(who, given.stamp, pose, self._store, self._counts)
+                self._together.take(who, given.stamp, pose, self._store, self._counts, float(self._numbers[4]))
                 self._looked = True
         return wrong
 
@@ -295,4 +293,5 @@ class RangeSensing:
         return notes
 
 
+AGAIN = 0.1  # without any image, hidden places are looked for so often: they are around the robot, which moves [s]
 _NONE, _NO_LINKS = np.empty((0, 3)), np.empty(0, dtype=np.int64)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+LEAST_INCREMENT = 1e-5  # between rays of a scanner [rad]
 WORLD = "world"
 
 
@@ -185,6 +186,8 @@ class RangeSensor:
         whole = rows_and_columns((1, count))
         if whole is None or count < 1:
             raise ConfigurationError(where, "count", count, "a whole number of rays >= 1")
+        if count > 1 and abs(increment) < LEAST_INCREMENT:
+            raise ConfigurationError(where, "increment", increment, f"at least {LEAST_INCREMENT} rad: rays that differ")
         angles = angle_min + increment * np.arange(whole[1])
         directions = np.stack((np.cos(angles), np.sin(angles), np.zeros(whole[1])), axis=-1)
         return cls(name, directions, np.asarray(0.5 * abs(increment)), **parts)  # type: ignore[arg-type]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.ranging.fusion import LookingThrough
-from qpsafe.ranging.reduction.candidates_kernel import LOST, STAMP, WRONG, lost_before
+from qpsafe.ranging.reduction.candidates_kernel import LOST, STAMP, VELOCITY, WRONG, lost_before
 from qpsafe.sensing.hulls import HullSet
 
 if TYPE_CHECKING:
@@ -51,16 +52,20 @@ class Together:
         hulls: The robot itself and known obstacles: nobody is in them.
         person: How fast people come [m/s].
         room: How many points all sensors have at most.
+        mounts: Body that carries each sensor, and its pose there.
+        running: a_h and the fastest anybody becomes, see `person_speed` [m/s², m/s].
     """
 
     def __init__(
-        self, reducers: list[Reducer], tolerance: float, deviations: float, hulls: HullSet, person: float, room: int
-    ) -> None:
+        self, reducers: list[Reducer], tolerance: float, deviations: float, hulls: HullSet, person: float, room: int,
+        mounts: Sequence[tuple[int, Array]], running: tuple[float, float],
+    ) -> None:  # fmt: skip
         self._lookers = [LookingThrough(reducer.zones, tolerance, deviations) for reducer in reducers]
         self._hulls, self._person, self._tolerance = hulls, person, tolerance
+        self._mounts, self._running = mounts, running
         self._reach = [reducer.zones.range_max for reducer in reducers]
         self._covers = [reducer.zones.covers for reducer in reducers]
-        self._reducers = reducers
+        self._reducers, self._zones = reducers, [len(reducer.zones.directions) for reducer in reducers]
         self._found = np.empty((room, 2), dtype=np.int64)
         self.reset()
 
@@ -68,10 +73,13 @@ class Together:
         """Forget all images."""
         self.views: list[View | None] = [None] * len(self._lookers)
 
-    def take(self, who: int, stamp: float, pose: Array, store: Array, counts: NDArray[np.int64]) -> None:
+    def take(
+        self, who: int, stamp: float, pose: Array, store: Array, counts: NDArray[np.int64], person: float = 0.0
+    ) -> None:
         """Take a usable image; points that others have lost, and that it looks through, are forgotten.
 
-        A lost point may have moved since it was seen: all of what it can have reached has to be looked through.
+        A lost point may have moved since it was seen, by max(v_h, |ṗ| + a_h t) t: all of what it can have reached has
+        to be looked through.
 
         Args:
             who: Number of the sensor.
@@ -79,6 +87,7 @@ class Together:
             pose: Of the sensor then (4, 4).
             store: Points of all sensors (s, r, WIDTH).
             counts: How many points each holds (s,).
+            person: How fast people come, if that is more than what was given at first [m/s].
         """
         reducer = self._reducers[who]
         self.views[who] = View(stamp, pose, reducer.distances.copy(), reducer.valid.copy(), reducer.sigma.copy())
@@ -86,7 +95,10 @@ class Together:
         if count:
             sensors, rows = self._found[:count].T
             points = store[sensors, rows]
-            errors = points[:, WRONG] + self._person * (stamp - points[:, STAMP])
+            elapsed, (acceleration, fastest) = stamp - points[:, STAMP], self._running
+            known = np.linalg.norm(points[:, VELOCITY : VELOCITY + 3], axis=1)
+            known = np.where(known > 0.0, np.minimum(known + acceleration * elapsed, fastest), 0.0)
+            errors = points[:, WRONG] + np.maximum(known, max(self._person, person)) * elapsed
             through = self._through(who, np.ascontiguousarray(points[:, :3]), errors)
             store[sensors[through], rows[through], LOST] = -np.inf
 
@@ -112,10 +124,12 @@ class Together:
         places = places[self._hulls.find(places, np.full(len(places), self._tolerance), poses) < 0]
         covered = np.zeros(len(places), dtype=np.bool_)
         for who, view in enumerate(self.views):
-            if view is not None and self._covers[who]:
-                nothing = np.full(len(view.distances), np.inf)
+            if self._covers[who]:  # where it was at its last image, or is now if it never sent one
+                body, place = self._mounts[who]
+                nothing = np.full(self._zones[who], np.inf)
                 all_of_them = np.ones(len(nothing), dtype=np.bool_)
-                covered |= self._lookers[who](places, 0.0, view.pose, nothing, all_of_them, 0.0)
+                pose = poses[body] @ place if view is None else view.pose
+                covered |= self._lookers[who](places, 0.0, pose, nothing, all_of_them, 0.0)
         places = places[covered]
         for who, view in enumerate(self.views):
             if view is not None and len(places):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,6 +9,10 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import JointLimits
+from qpsafe.text.given import number
+
+#: Between these times, speeds and lengths can be computed with.
+LEAST, MOST = 1e-100, 1e100
 
 
 @dataclass(frozen=True)
@@ -52,13 +55,17 @@ class RecoveryRules:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value, waits = getattr(self, item.name), item.name == "dwell"
+            value = getattr(self, item.name)
             if item.type == "bool":
                 if not isinstance(value, bool):
                     raise ConfigurationError("RecoveryRules", item.name, value, "True or False")
-            elif not (isinstance(value, int | float) and (0.0 < value < math.inf or (waits and value == 0.0))):
-                expected = "a finite number >= 0" if waits else "a finite number > 0"
-                raise ConfigurationError("RecoveryRules", item.name, value, expected)
+            elif item.name == "dwell":
+                expected = f"a finite number >= 0, up to {MOST:g}"
+                value = number("RecoveryRules", item.name, value, expected, 0.0, most=MOST)
+            else:
+                expected = f"a finite number > 0, from {LEAST:g} to {MOST:g}"
+                value = number("RecoveryRules", item.name, value, expected, LEAST, most=MOST)
+            object.__setattr__(self, item.name, value)
         for key in ("acceleration", "calm"):
             if getattr(self, key) > 1.0:
                 raise ConfigurationError("RecoveryRules", key, getattr(self, key), "a share in (0, 1]")

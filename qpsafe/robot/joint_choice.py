@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from itertools import combinations
+from math import isfinite
+from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,9 +90,11 @@ def choose_joints(
         wanted: Joints that the caller wants to move.
 
     Raises:
-        RobotFileError: `hold` names no joint or a value out of its range; a joint in the chain moves with another one;
-            nothing is left.
+        RobotFileError: `hold` is no mapping, names no joint, or has a value that is no number or out of range; a joint
+            in the chain moves with another one; nothing is left.
     """
+    if not isinstance(hold, Mapping):
+        raise RobotFileError(path, "hold", hold, 'the values of joints by name, e.g. {"finger": 0.02} [rad or m]')
     by_name = {joint.name: joint for joint in joints}
     held = {name: _held_at(path, by_name, name, value, units) for name, value in hold.items()}
     movable = {joint.name for joint in joints if joint.kind in (HINGE, SLIDE)}
@@ -141,6 +145,8 @@ def _held_at(path: Path, by_name: dict[str, FoundJoint], name: str, value: float
     if joint is None or joint.kind not in (HINGE, SLIDE):
         listed = ", ".join(joint.name for joint in by_name.values() if joint.kind in (HINGE, SLIDE))
         raise RobotFileError(path, f"hold.{name}", name, f"a revolute or prismatic joint of {path.name}: {listed}")
+    if not isinstance(value, Real) or isinstance(value, bool) or not isfinite(value):
+        raise RobotFileError(path, f"hold.{name}", value, "a finite number [rad or m]")
     scale = units[joint.kind == SLIDE]
     if not joint.lower - _TOLERANCE <= value * scale <= joint.upper + _TOLERANCE:
         expected = f"within its range, {joint.lower / scale:g} to {joint.upper / scale:g}"

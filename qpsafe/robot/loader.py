@@ -21,6 +21,7 @@ from qpsafe.robot.robot_file.defaults import spec_from_model
 from qpsafe.robot.robot_file.schema import RobotFile, read_robot_file, table_key
 from qpsafe.robot.robot_file.spec import DHChain, Region, RobotSpec, Tool, Tuned
 
+_SPOTS = "spots.toml"  # sensors that are placed later: a folder may name them before
 _TOLERANCE = 1e-6  # rad and m: how well robot.toml must agree with the model file
 
 
@@ -47,7 +48,7 @@ def load_robot(
         name_or_path: A bundled name (see `bundled_robots`); the path of a robot folder (with `robot.toml`); an MJCF
             or URDF file, from which limits, frames and a wire along the joint tree are taken; or a model of another
             package, ``"robot_descriptions:panda_description"`` or ``"example_robot_data:ur5"``.
-        toml: A `robot.toml` that describes this model file, wherever it is.
+        toml: A `robot.toml` that describes this model file, wherever it is; not for what has one of its own.
         lower: Lower position limits for a bare model file, one number or (n,) [rad].
         upper: Upper position limits for a bare model file, one number or (n,) [rad].
         max_velocity: Speed limits for a bare model file, one number or (n,) [rad/s]; 1 where neither is stated (MJCF).
@@ -74,7 +75,10 @@ def load_robot(
     }
     given = {key: value for key, value in overrides.items() if value is not None}
     path = find_robot(name_or_path)
-    described = path if path.suffix == ".toml" else None if toml is None else Path(toml)
+    if path.suffix == ".toml" and toml is not None:
+        expected = f"nothing: {path} describes this robot; give its model file to describe that anew"
+        raise RobotFileError("load_robot", "toml", str(toml), expected)
+    described = path if path.suffix == ".toml" else None if toml is None else Path(toml).absolute()
     if described is not None:
         for key, value in (given | ({} if hold is None else {"hold": hold})).items():
             raise RobotFileError("load_robot", key, value, f"nothing: {described} states the limits; edit it instead")
@@ -105,17 +109,21 @@ def _bundled_folder() -> Path:
 
 
 def find_robot(name_or_path: str | Path) -> Path:
-    """The robot.toml or model file that is meant; raises RobotFileError where there is none."""
+    """The robot.toml or model file that is meant, by its whole path: some of its files are read later.
+
+    Raises:
+        RobotFileError: There is none.
+    """
     bundled = bundled_robots()
     if is_package_model(str(name_or_path)):
-        return find_package_model(str(name_or_path))
+        return find_package_model(str(name_or_path)).absolute()
     if str(name_or_path) in bundled:
         return _bundled_folder() / str(name_or_path) / "robot.toml"
     path = Path(name_or_path)
     if os.path.isdir(path):  # unlike Path.is_dir, False for what cannot be a name
-        return path / "robot.toml"
+        return path.absolute() / "robot.toml"
     if os.path.isfile(path):
-        return path
+        return path.absolute()
     expected = (
         f"a bundled robot ({', '.join(bundled)}), the path of a robot folder, an MJCF or a URDF file, or PACKAGE:MODEL"
     )
@@ -174,6 +182,11 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         chains.append(DHChain(rows, tuple(table.frames), tuple(names.index(name) for name in order)))
     danger = file.danger
     spots = None if file.spots is None else path.parent / file.spots
+    if spots is not None and not os.path.isfile(spots):
+        if file.spots != _SPOTS:
+            expected = f"a file in the same folder; only {_SPOTS} may be missing as yet"
+            raise RobotFileError(path, "spots", file.spots, expected)
+        spots = None
     regions = tuple(
         Region(
             r.name,
@@ -195,7 +208,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         folder=path.parent,
         model_path=model_path,
         notes=model_file.notes,
-        spots_path=spots if spots is not None and os.path.isfile(spots) else None,
+        spots_path=spots,
         joint_names=tuple(names),
         lower=si * np.array([joint.lower for joint in joints]),
         upper=si * np.array([joint.upper for joint in joints]),

@@ -154,7 +154,7 @@ class Robot(Fixed):
         other = copy(self)
         path = None if file is None else self.folder / file
         if path is not None and not os.path.isfile(path):  # no error for names that no system can have
-            path = Path(file)  # type: ignore[arg-type]
+            path = Path(file).absolute()  # type: ignore[arg-type]
         other.__dict__["spots_path"] = path
         return other
 

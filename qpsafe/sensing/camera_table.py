@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-_Finite = Annotated[float, Field(ge=-1e3, le=1e3, allow_inf_nan=False)]
-_Positive = Annotated[float, Field(gt=0.0, le=1e3, allow_inf_nan=False)]
-_Pixels = Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
-_Place = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
-_Angle = Annotated[float, Field(gt=0.0, lt=180.0, allow_inf_nan=False)]
+from qpsafe.robot.robot_file.parameter_tables import Number
+
+#: Finer than any scanner: rays nearer to each other than this are the same one [deg].
+FINEST = 1e-3
+
+_Finite = Annotated[Number, Field(ge=-1e3, le=1e3)]
+_Positive = Annotated[Number, Field(gt=0.0, le=1e3)]
+_Pixels = Annotated[Number, Field(gt=0.0, le=1e5)]
+_Place = Annotated[Number, Field(ge=-1e5, le=1e5)]
+_Angle = Annotated[Number, Field(gt=0.0, lt=180.0)]
+_Side = Annotated[int, Field(strict=True, ge=1, le=4096)]
+_Zones = Annotated[int, Field(strict=True, ge=1, le=64)]
 _Vector = tuple[_Finite, _Finite, _Finite]
 
 
@@ -23,10 +30,10 @@ class _Camera(BaseModel):
     quaternion: tuple[_Finite, _Finite, _Finite, _Finite] | None = None
     look_at: _Vector | None = None
     up: _Vector | None = None
-    range_min: Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)] = 0.02
+    range_min: Annotated[Number, Field(ge=0.0, le=1e3)] = 0.02
     range_max: _Positive
-    rate: Annotated[float, Field(ge=0.01, le=1e4, allow_inf_nan=False)]
-    sigma: Annotated[float, Field(ge=0.0, le=1e2, allow_inf_nan=False)] = 0.01
+    rate: Annotated[Number, Field(ge=0.01, le=1e4)]
+    sigma: Annotated[Number, Field(ge=0.0, le=1e2)] = 0.01
     max_age: _Positive | None = None
 
 
@@ -34,7 +41,7 @@ class DepthTable(_Camera):
     """A `[[camera]]` of the kind "depth": an image of pixels, with `intrinsics` or `field_of_view`."""
 
     kind: Literal["depth"]
-    resolution: tuple[Annotated[int, Field(ge=1, le=4096)], Annotated[int, Field(ge=1, le=4096)]]
+    resolution: tuple[_Side, _Side]
     intrinsics: tuple[_Pixels, _Pixels, _Place, _Place] | None = None
     field_of_view: tuple[_Angle, _Angle] | None = None
 
@@ -43,7 +50,7 @@ class ArrayTable(_Camera):
     """A `[[camera]]` of the kind "array": a time-of-flight array."""
 
     kind: Literal["array"]
-    zones: tuple[Annotated[int, Field(ge=1, le=64)], Annotated[int, Field(ge=1, le=64)]]
+    zones: tuple[_Zones, _Zones]
     field_of_view: _Angle
 
 
@@ -51,9 +58,18 @@ class ScannerTable(_Camera):
     """A `[[camera]]` of the kind "scanner": rays in a plane."""
 
     kind: Literal["scanner"]
-    angle_min: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)]
-    increment: Annotated[float, Field(ge=-90.0, le=90.0, allow_inf_nan=False)]
-    rays: Annotated[int, Field(ge=1, le=20000)]
+    angle_min: Annotated[Number, Field(ge=-360.0, le=360.0)]
+    rays: Annotated[int, Field(strict=True, ge=1, le=20000)]
+    increment: Annotated[Number, Field(ge=-90.0, le=90.0)]
+
+    @field_validator("increment")
+    @classmethod
+    def _apart(cls, value: float, said: ValidationInfo) -> float:
+        """No two rays look the same way but the last one of a whole turn and the first."""
+        rays = said.data.get("rays", 1)
+        if rays > 1 and not (abs(value) >= FINEST and (rays - 2) * abs(value) <= 360.0):
+            raise ValueError(f"{rays} rays at least {FINEST} deg apart, and at most one turn of them")
+        return value
 
 
 CameraTable = Annotated[DepthTable | ArrayTable | ScannerTable, Field(discriminator="kind")]

@@ -15,18 +15,17 @@ Its `[[camera]]` tables say what looks at the cell; `qpsafe.ranging.cell_cameras
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.robot.robot_file.parameter_tables import Number
 from qpsafe.sensing.camera_table import KINDS, CameraTable
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.text.toml_text import Keys, TomlText
 
-_Finite = Annotated[float, Field(allow_inf_nan=False)]
-_Vector = tuple[_Finite, _Finite, _Finite]
+_Vector = tuple[Number, Number, Number]
 
 
 class _Table(BaseModel):

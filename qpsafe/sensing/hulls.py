@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import numbers
 from qpsafe.text.words import call
 
 
@@ -98,7 +99,7 @@ def half_spaces(name: str, vertices: ArrayLike) -> Array:
     from scipy.spatial import QhullError
 
     expected = "finite vertices (v, 3) that span a volume [m]"
-    points = np.asarray(vertices, dtype=float)
+    points = numbers(f"obstacle {name}", "vertices", vertices, expected)
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
         raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
     try:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import LARGEST
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class SensingRules:
     def _check(self, key: str, least: float, most: float, expected: str) -> None:
         value = getattr(self, key)
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (number and math.isfinite(value) and least <= value <= most):
+        if not (number and abs(value) <= LARGEST and least <= value <= most):  # of NaN false
             raise ConfigurationError("SensingRules", key, value, expected)
 
     @staticmethod

@@ -7,7 +7,7 @@ nearer is ambiguous, farther is noise.
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 PEAK = 0.15
 #: Below this [V] the sensor has no supply or a wire is broken: with nothing in sight it still gives more.
 DEAD_VOLTAGE = 0.05
+#: The supply [V]: no reading is more.
+SUPPLY = 5.0
+#: Where it is used [m], and the least that a curve falls over this range: a typical one falls by 1.7 [V].
+RANGE, LEAST_FALL = (0.2, 0.8), 0.05
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class SharpCurve:
         bias: [V].
 
     Raises:
-        ConfigurationError: Not a curve that falls over the sensor's range.
+        ConfigurationError: Not a curve that falls over the sensor's range, at voltages that a sensor can give.
     """
 
     gain: float = 0.70
@@ -44,12 +48,20 @@ class SharpCurve:
     def __post_init__(self) -> None:
         for key in ("gain", "offset", "bias"):
             value = getattr(self, key)
-            if not (isinstance(value, int | float) and math.isfinite(value)):
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and abs(value) <= sys.float_info.max):
                 raise ConfigurationError("SharpCurve", key, value, "a finite number")
         if not self.gain > 0.0:
             raise ConfigurationError("SharpCurve", "gain", self.gain, "a number > 0 [V m]")
         if not self.offset > -PEAK:
             raise ConfigurationError("SharpCurve", "offset", self.offset, f"a number > {-PEAK} [m]")
+        near, far = (self.gain / (d + self.offset) + self.bias for d in RANGE)
+        if not (near > DEAD_VOLTAGE and far < SUPPLY and near - far >= LEAST_FALL):
+            expected = (
+                f"a voltage that falls by at least {LEAST_FALL} V, from more than {DEAD_VOLTAGE} V at {RANGE[0]} m to "
+                f"less than {SUPPLY} V at {RANGE[1]} m: here from {near:.4g} to {far:.4g} V"
+            )
+            raise ConfigurationError("SharpCurve", "gain, offset, bias", (self.gain, self.offset, self.bias), expected)
 
     def voltage(self, distance: ArrayLike) -> Array:
         """Voltage at distances beyond the peak [V]."""
@@ -58,7 +70,7 @@ class SharpCurve:
     def distance(self, voltage: ArrayLike) -> Array:
         """The inverse: distance [m] of a voltage; +inf at or below the bias."""
         above = np.asarray(voltage, dtype=float) - self.bias
-        with np.errstate(divide="ignore"):
+        with np.errstate(over="ignore"):  # a voltage just above the bias
             return np.where(above > 0.0, self.gain / np.where(above > 0.0, above, 1.0) - self.offset, np.inf)
 
 

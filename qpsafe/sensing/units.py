@@ -94,10 +94,13 @@ class UnitWatch:
             given = distances if points is None else points
             if given is None:  # images only
                 return self._notes
-            array = np.asarray(given, dtype=float)
-            if array.ndim == 1 and points is None:
+            try:  # a copy: what a user gave may change while it is read, and compiled code does not look at sizes
+                array = np.array(given, dtype=float)
+            except Exception:  # it is not any more what the tick has accepted
+                return self._notes
+            if array.shape == self._counts.shape and points is None:
                 self._look_at_readings(array)
-            else:
+            elif array.ndim == 2 and array.shape[1] == 3:
                 self._look_at_points(array)
         return self._notes
 

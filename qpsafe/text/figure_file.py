@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from qpsafe.text.whole_file import whole_file
+
 
 def save(figure: Any, path: Path) -> None:
     """Write whole or not at all."""
-    part = path.with_name("." + path.name)
-    try:
+    with whole_file(path) as part:
         figure.savefig(part, format=path.suffix.lstrip("."))
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -10,6 +10,11 @@ _HEAD = re.compile(r"\s*+(\[\[?)([^\]]++)\]")
 _KEY = re.compile(r"\s*+([\w.\"'-]++)\s*+=")
 
 
+def toml_lines(text: str) -> list[str]:
+    """The lines of a TOML text, without their ends: only a newline ends one, not all that `str.splitlines` takes."""
+    return text.replace("\r\n", "\n").removesuffix("\n").split("\n")
+
+
 def line_of(text: str, keys: Sequence[str | int]) -> int:
     """Line, from 1, of a key such as ``("segment", 2, "to")``, or of the innermost table around it that has a line."""
     lines = key_lines(text)
@@ -24,7 +29,7 @@ def key_lines(text: str) -> dict[Key, int]:
     found: dict[Key, int] = {}
     counts: dict[Key, int] = {}  # of the tables in each array so far
     table: Key = ()
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(toml_lines(text), start=1):
         if head := _HEAD.match(line):
             table = _inside(counts, _split(head.group(2)))
             if head.group(1) == "[[":

@@ -17,8 +17,16 @@ LARGEST = 1_000_000
 DEEPEST = 10
 #: TOML promises whole numbers of 64 bits.
 _WHOLE = range(-(2**63), 2**63)
-_PART = r"""(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}}")
+_BASIC, _LITERAL = r'"(?:[^"\\\n]|\\[^\n])*+"', r"'[^'\n]*+'"
+_PART = rf"(?:(?<![\w-])[\w-]++|{_BASIC}|{_LITERAL})"
+#: Comments and strings, in which dots mean nothing, and the group: a key of too many parts. From left to right, up to
+#: the first mistake in a text, they are what the standard library reads; each is passed once, even if it never ends.
+_TOKEN = re.compile(
+    r'#[^\n]*+|"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}+|\\?\Z)'
+    r"|'''(?:[^']|'(?!''))*+(?:'{3,5}+|\Z)"
+    rf"|({_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST}}})|{_BASIC}?|{_LITERAL}?",
+    re.DOTALL,
+)
 
 
 def read_bounded(path: Path) -> str:
@@ -48,7 +56,7 @@ def toml_table(text: str) -> dict[str, Any]:
     """
     if len(text) > LARGEST:
         raise tomllib.TOMLDecodeError(f"it is larger than {LARGEST:,} characters")
-    if long := _LONG_KEY.search(text):
+    if long := next((token for token in _TOKEN.finditer(text) if token[1]), None):
         line = text.count("\n", 0, long.start()) + 1
         raise tomllib.TOMLDecodeError(f"A key of more than {DEEPEST} parts (at line {line})")
     try:

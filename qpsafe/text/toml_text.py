@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.complaints import expected_words
-from qpsafe.text.lines import line_of
+from qpsafe.text.lines import line_of, toml_lines
 from qpsafe.text.toml_parse import read_bounded, toml_table
 
 Keys = Sequence[str | int]
@@ -60,7 +60,7 @@ class TomlText:
             table = toml_table(self.text)
         except tomllib.TOMLDecodeError as problem:
             found = re.search(r"at line (\d+)", str(problem))
-            line = found.group(1) if found else str(len(self.text.splitlines()))
+            line = found.group(1) if found else str(len(toml_lines(self.text)))
             raise self._error(f"{self.path}:{line}", "file", str(problem), "well-formed TOML") from None
         try:
             return model.model_validate(table)

@@ -8,6 +8,7 @@ ended.
 from __future__ import annotations
 
 import hashlib
+import os
 import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
@@ -91,15 +92,16 @@ class Plan:
             value = getattr(self, key)
             if not isinstance(value, str) and (value is not None or key == "robot"):
                 raise ConfigurationError("Plan", key, value, "a name or a path, as text")
+        # os.path, unlike Path, says False of what cannot be a name
         for motion in self.motions:
-            if motion not in MOTIONS and not (motion.endswith(".toml") and Path(motion).is_file()):
+            if motion not in MOTIONS and not (motion.endswith(".toml") and os.path.isfile(motion)):
                 expected = f"{', '.join(MOTIONS)}, or a program's file that is there"
                 raise ConfigurationError("Plan", "motions", motion, expected)
-        if self.people is not None and not Path(self.people).exists():
+        if self.people is not None and not os.path.exists(self.people):
             raise ConfigurationError(
                 "Plan", "people", self.people, "a TOML file, or a folder of stories, that is there"
             )
-        if self.cell is not None and not Path(self.cell).is_file():
+        if self.cell is not None and not os.path.isfile(self.cell):
             raise ConfigurationError("Plan", "cell", self.cell, "a TOML file of furniture that is there")
         for name in self.controllers:
             _check_controller(name)
@@ -116,7 +118,7 @@ class Plan:
         """What decides a trial's rows: the plan but for its length, contents of its files, and the code's digest."""
         named = self.to_dict()
         del named["trials"]
-        files = [path for path in (*self.motions, self.people or "", self.cell or "") if path and Path(path).exists()]
+        files = [path for path in (*self.motions, self.people or "", self.cell or "") if path and os.path.exists(path)]
         for name in self.controllers:
             place = name.removesuffix(PERFECT).rpartition(":")[0]
             if place:  # a user's own
@@ -188,7 +190,7 @@ def parse_plan(text: TomlText, folder: Path = Path()) -> Plan:
     for key in ("people", "cell"):
         if tables[key] is not None:
             tables[key] = str(folder / tables[key])
-    if (folder / said.robot).exists():
+    if os.path.exists(folder / said.robot):
         tables["robot"] = str(folder / said.robot)
     try:
         find_robot(tables["robot"])

@@ -96,13 +96,14 @@ def run_faults(
         count: Number of moments.
         seed: Of the moments and of the wire.
         cases: Lines of the matrix.
-        jobs: Processes, where the system can fork; 1 elsewhere.
+        jobs: Processes, where the system can fork, never more than moments; 1 elsewhere.
         progress: Called with moments done and to do.
         latest: Tick before which all moments lie.
 
     Raises:
         QpsafeError: A worker process died.
     """
+    jobs = min(jobs, count)
     rng = np.random.default_rng(seed)
     moments = np.sort(rng.integers(EARLIEST, latest, size=count)).tolist()
     bench, copies = Workbench(robot, seed=seed), []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.sim.irc5.irc5_loop import Irc5Loop
 from qpsafe.sim.irc5.link import NO_FAULTS, WireFaults
 from qpsafe.sim.irc5.udp import NoAnswerError, UdpExchange
@@ -43,7 +45,18 @@ def happenings(
         faults: Of the wire.
         faulty: From when on, and for how long [s].
         strangers: Share of cycles in which somebody else sends, during the same time.
+
+    Raises:
+        ConfigurationError: A time that is none, or a share that is none.
     """
+    times = {"restarts": [(t, 0.0) for t in restarts], "motors_off": motors_off, "rapid_stop": rapid_stop}
+    for key, spans in (times | {"faulty": [faulty]}).items():
+        for start, length in spans:
+            if not (0.0 <= start < math.inf and length >= 0.0):  # true for NaN
+                expected = "a time from 0 on, and where it has a length one from 0 on [s]"
+                raise ConfigurationError("happenings", key, (start, length), expected)
+    if not 0.0 <= strangers <= 1.0:
+        raise ConfigurationError("happenings", "strangers", strangers, "0 to 1")
     found = [Happening(t, lambda run, wire: run.irc5.restart(0.1)) for t in restarts]
     for start, length in motors_off:
         found.append(Happening(start, lambda run, wire: run.irc5.motors(False)))

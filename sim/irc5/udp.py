@@ -21,6 +21,7 @@ from qpsafe.irc5.messages import (
     decode_sensor,
     encode_robot,
 )
+from qpsafe.irc5.transport.addresses import host_address, udp_port
 from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.sim.irc5.link import NO_FAULTS, Wire, WireFaults
 
@@ -66,6 +67,10 @@ class UdpExchange:
         if not 0.0 <= strangers <= 1.0:
             raise ConfigurationError("UdpExchange", "strangers", strangers, "0 to 1")
         self._axes, self.strangers = axes_of(joints) if isinstance(joints, int) else joints, strangers
+        self._sensors: SensorOutput | None = None
+        self._stream = ("127.0.0.1", 9)  # discard
+        if stream is not None:
+            self.aim(stream, sensors)
         self._socket, self._stranger, self._events = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in "123")
         try:
             self._events.bind(("127.0.0.1", event_port))
@@ -74,18 +79,19 @@ class UdpExchange:
         for each in (self._socket, self._stranger, self._events):
             each.setblocking(False)
         self.events: tuple[str, int] = self._events.getsockname()
-        self._sensors: SensorOutput | None = None
-        self._stream = ("127.0.0.1", 9)  # discard
-        if stream is not None:
-            self.aim(stream, sensors)
         self._rng = np.random.default_rng((seed, 7))
         self.out, self.back = (Wire(faults, np.random.default_rng((seed, k))) for k in range(2))
         self._lockstep, self._patience = lockstep, patience
         self.rejected = 0
 
     def aim(self, stream: tuple[str, int], sensors: tuple[str, int] | None) -> None:
-        """Tell where the other end listens."""
-        self._stream = stream
+        """Tell where the other end listens.
+
+        Raises:
+            ConfigurationError: A host has no address, or a port is none.
+        """
+        host, port = stream  # looked up here once: with a name every cycle would ask for its address
+        self._stream = host_address("UdpExchange", "host", host), udp_port("UdpExchange", port, least=1)
         self._sensors = None if sensors is None else SensorOutput(*sensors)
 
     def close(self) -> None:

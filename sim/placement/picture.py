@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from qpsafe.robot.models.mjcf import held_positions
 from qpsafe.sim.drawing.gl import make_context
 from qpsafe.sim.world.robot_spec import robot_spec, shown_groups
+from qpsafe.text.whole_file import whole_file
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -76,12 +77,8 @@ def save_picture(path: Path, robot: Robot, spots: SpotArray, chosen: NDArray[np.
     """
     import matplotlib.image
 
-    part = path.with_name("." + path.name + ".part.png")
-    try:
-        matplotlib.image.imsave(part, picture(robot, spots, chosen))
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(path) as part:
+        matplotlib.image.imsave(part, picture(robot, spots, chosen), format="png")
 
 
 def _view(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.text.whole_file import whole_file
 from qpsafe.text.words import counted
 from qpsafe.tick import Tick
 
@@ -92,15 +92,10 @@ class RunLog:
     def write_csv(self, path: Path) -> None:
         """Write everything but the wall times as CSV, whole or not at all."""
         names, columns = self._columns()
-        part = path.with_name(path.name + ".part")
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                file.write(",".join(names) + "\n")
-                for row in zip(*columns, strict=True):
-                    file.write(",".join(row) + "\n")
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
+        with whole_file(path) as part, part.open("w", encoding="utf-8") as file:
+            file.write(",".join(names) + "\n")
+            for row in zip(*columns, strict=True):
+                file.write(",".join(row) + "\n")
 
     def _columns(self) -> tuple[list[str], list[list[str]]]:
         names, columns = [], []

@@ -100,12 +100,19 @@ def run_matrix(
         count: Number of moments, at random while somebody is seen during an approach.
         seed: Of the moments and of the sensors that fall sick.
         cases: Lines of the table; by default those of images where the experiment has sensors that make some.
-        jobs: Processes, where the system can fork; 1 elsewhere.
+        jobs: Processes, where the system can fork, never more than moments; 1 elsewhere.
         progress: Called with work done and to do.
+
+    Raises:
+        ConfigurationError: There are no sensors that could fall sick, or fewer moments than asked for.
     """
+    jobs = min(jobs, count)
     moments = random_moments(experiment, 5 * count, seed)
     copies: list[tuple[FixedLoop, Array]] = []
     loop = FixedLoop(experiment)
+    if not loop.sensor_names:
+        expected = "sensors that can fall sick: ideal, sharp, vl53l5cx, depth, or several joined by +"
+        raise ConfigurationError("run_matrix", "sensor", experiment.sensor, expected)
     if cases is None:
         cases = CASES if loop.ranging is None else FRAME_CASES
     total = moments[-1] + 1 + count * (len(cases) + 1) * WINDOW

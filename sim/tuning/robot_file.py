@@ -13,6 +13,7 @@ from qpsafe.robot.loader import load_quietly
 from qpsafe.robot.robot_file.schema import Units
 from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.tuning.values import Values, present
+from qpsafe.text.lines import toml_lines
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -91,7 +92,7 @@ def edited(text: str, tables: Mapping[str, Mapping[str, Any]], comment: str) -> 
     Returns:
         None where that could not be done by lines.
     """
-    lines = text.splitlines()
+    lines = toml_lines(text)
     for table, values in tables.items():
         lines = _with_table(lines, table, values, comment)
     found = "\n".join(lines) + "\n"

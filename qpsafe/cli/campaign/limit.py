@@ -43,7 +43,9 @@ def limit(
     ] = None,
     plan: FileOption = None,
     typed: Typed,
-    evaluations: Annotated[int | None, typer.Option(min=100, help="Motions to try per trial; 800 by default.")] = None,
+    evaluations: Annotated[
+        int | None, typer.Option(min=100, max=1_000_000, help="Motions to try per trial; 800 by default.")
+    ] = None,
     workers: Workers = WORKERS,
     dask: Dask = None,
     json: Json = False,

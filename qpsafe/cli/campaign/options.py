@@ -29,7 +29,7 @@ WORKERS = os.cpu_count() or 1
 
 File = Annotated[Path | None, typer.Argument(help="A plan, docs/reference/files.md; options override it.")]
 FileOption = Annotated[Path | None, typer.Option("--file", help="A plan, as the argument; options override it.")]
-Workers = Annotated[int, typer.Option(min=1, help="Number of processes; by default one per processor.")]
+Workers = Annotated[int, typer.Option(min=1, max=1024, help="Number of processes; by default one per processor.")]
 Dask = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead of --workers.")]
 Json = Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")]
 

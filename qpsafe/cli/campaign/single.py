@@ -91,7 +91,9 @@ def _show_row(row: dict[str, Any], screen: Console) -> None:
 def worst(
     *,
     controller: Annotated[str, typer.Argument(help="Controller whose worst case is wanted.")],
-    trials: Annotated[int, typer.Option(min=1, help="Trials for the search, and as many again at random.")] = 2000,
+    trials: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Trials for the search, and as many again at random.")
+    ] = 2000,
     plan: FileOption = None,
     typed: Typed,
     workers: Workers = WORKERS,

@@ -43,7 +43,7 @@ def fixed(
         typer.Option(help="Projection of the hierarchical law: paper reproduces (22), strict is lexicographic."),
     ] = ProjectionName.strict,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of how the person moves; 0 is nominal.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of how the person moves; 0 is nominal.")] = 0,
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
     ] = 0.0,
@@ -90,6 +90,7 @@ def fixed(
     from qpsafe.sim.ranging.sets import sensor_kinds
     from qpsafe.sim.stories.file import load_story
 
+    make_law(law, projection, solver)  # what is wrong there is said before anything is loaded
     if sensor_kinds(sensor).spots == "perfect":
         raise ConfigurationError(
             "qpsafe demo fixed", "sensor", sensor, "sensors: a run is remembered by their readings"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def path(
     robot: RobotName = "irb140",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of how the person moves; 0 is nominal.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of how the person moves; 0 is nominal.")] = 0,
     lag: Annotated[
         float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
     ] = 0.0,

@@ -38,8 +38,12 @@ if TYPE_CHECKING:
 
 def pick_and_place(
     robot: RobotName = "irb140",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of where, when and how fast people go; 0 is nominal.")] = 0,
-    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds to run, from --seed on; prints the spread.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**53, help="Seed of where, when and how fast people go; 0 is nominal.")
+    ] = 0,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Number of seeds to run, from --seed on; prints the spread.")
+    ] = 1,
     cycles: Annotated[int, typer.Option(min=1, max=100, help="Screws to carry in each run.")] = 10,
     people: Annotated[
         Path | None, typer.Option(help="TOML file of a story; by default the bundled two people.")
@@ -61,7 +65,7 @@ def pick_and_place(
         SensorName, typer.Option(help="Perfect distances, or simulated Sharp sensors.")
     ] = SensorName.ideal,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+        int, typer.Option(min=1, max=1024, help="Number of processes; by default one per processor.")
     ] = os.cpu_count() or 1,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
         "out/demo-pick-and-place"
@@ -86,6 +90,7 @@ def pick_and_place(
     from qpsafe.sim.experiments.pick_place.settings import PEOPLE
     from qpsafe.sim.world.known import known_obstacles
 
+    make_law(law, projection, solver)  # what is wrong there is said before a minute is spent
     if robot != ROBOT:
         screen.print("looking for a layout of the cell that suits the arm (up to a minute) ...", style="dim")
     machine = any_robot("qpsafe demo pick-and-place", robot, out, screen, picks=program is None)

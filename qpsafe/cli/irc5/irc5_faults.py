@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 def irc5_faults(
     moments: Annotated[int, typer.Option(min=1, max=500, help="Number of random moments while the robot moves.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the moments and of the wire.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of the moments and of the wire.")] = 0,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+        int, typer.Option(min=1, max=1024, help="Number of processes; by default one per processor.")
     ] = os.cpu_count() or 1,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:

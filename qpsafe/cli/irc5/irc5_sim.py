@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from qpsafe.sim.irc5.process import RobotRun
 
+WHERE = "qpsafe irc5-sim"
+
 
 def irc5_sim(
     experiment: Annotated[
@@ -40,9 +42,11 @@ def irc5_sim(
     ),
     duration: Annotated[
         float | None,
-        typer.Option(min=0.1, help="Length of the run, from the first answer [s]; by default the experiment's."),
+        typer.Option(
+            min=0.1, max=1e9, help="Length of the run, from the first answer [s]; by default the experiment's."
+        ),
     ] = (None),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of people and faults; 0 is nominal.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of people and faults; 0 is nominal.")] = 0,
     lockstep: Annotated[
         bool, typer.Option("--lock-step", help="Wait for every answer, so that every run is the same.")
     ] = False,
@@ -93,6 +97,7 @@ def irc5_sim(
     realtime.one_thread()
     from qpsafe.cli.demos.any_robot import any_robot, own_folder
     from qpsafe.irc5.process.requests import Requests
+    from qpsafe.irc5.transport.addresses import host_address
     from qpsafe.irc5.transport.axes import axes_of_robot
     from qpsafe.sim.experiments.by_name import experiment_loop
     from qpsafe.sim.irc5.irc5_loop import Irc5Loop
@@ -101,6 +106,7 @@ def irc5_sim(
     from qpsafe.sim.irc5.process import farewell, happenings, run_robot
     from qpsafe.sim.irc5.udp import UdpExchange
 
+    address = host_address(WHERE, "--host", host)
     settings = EgmSettings(
         gain=gain,
         lowpass=lowpass,
@@ -113,7 +119,7 @@ def irc5_sim(
     )
     faults = WireFaults(loss, delay, reorder, duplicate, garbage)
     todo = happenings(
-        restart or [],
+        [moment("--restart", time) for time in restart or ()],
         [span("--motors-off", text) for text in motors_off or ()],
         [span("--rapid-stop", text) for text in rapid_stop or ()],
         faults,
@@ -121,16 +127,16 @@ def irc5_sim(
         wrong_sender,
     )
     if lockstep and todo:
-        raise ConfigurationError("qpsafe irc5-sim", "--lock-step", "with faults", "no faults: it waits for answers")
+        raise ConfigurationError(WHERE, "--lock-step", "with faults", "no faults: it waits for answers")
     found = load_named(robot, screen)
     if found.spots_path is None:
-        found = any_robot("qpsafe irc5-sim", robot, own_folder(robot), screen)
+        found = any_robot(WHERE, robot, own_folder(robot), screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(
         axes_of_robot(found),
-        (host, port),
-        (host, sensor_port) if sensor_port else None,
+        (address, port),
+        (address, sensor_port) if sensor_port else None,
         event_port=event_port,
         seed=seed,
         lockstep=1.0 if lockstep else 0.0,
@@ -167,6 +173,13 @@ def irc5_sim(
         raise typer.Exit(1)
 
 
+def moment(option: str, time: float) -> float:
+    """A time of the run [s]."""
+    if not 0.0 <= time < math.inf:
+        raise ConfigurationError(WHERE, option, time, "a time in seconds, 0 or later, e.g. 5")
+    return time
+
+
 def span(option: str, text: str) -> tuple[float, float]:
     """Start and length from "START:LENGTH" [s]."""
     start, _, length = text.partition(":")
@@ -174,8 +187,8 @@ def span(option: str, text: str) -> tuple[float, float]:
         found = float(start), float(length)
     except ValueError:
         found = math.nan, math.nan
-    if not (found[0] >= 0.0 and found[1] >= 0.0):
-        raise ConfigurationError("qpsafe irc5-sim", option, text, "START:LENGTH in seconds, e.g. 5:0.5")
+    if not (0.0 <= found[0] < math.inf and found[1] >= 0.0):
+        raise ConfigurationError(WHERE, option, text, "START:LENGTH in seconds, e.g. 5:0.5")
     return found
 
 

@@ -48,9 +48,11 @@ def place(
     caps: Annotated[
         bool, typer.Option(help="Respect at_most of the regions (not in the curves, nor for (13)).")
     ] = True,
-    nodes: Annotated[int, typer.Option(help="Number of candidate nodes to aim for.")] = 254,
-    pairs: Annotated[int, typer.Option(help="Random pairs of robot and person in each of the two samples.")] = 3000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
+    nodes: Annotated[int, typer.Option(max=10_000, help="Number of candidate nodes to aim for.")] = 254,
+    pairs: Annotated[
+        int, typer.Option(max=10_000_000, help="Random pairs of robot and person in each of the two samples.")
+    ] = 3000,
+    seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of everything random.")] = 0,
     radius: Annotated[
         float | None,
         typer.Option(
@@ -61,7 +63,7 @@ def place(
         float, typer.Option(min=0.05, max=2.0, help="Height of the robot's base above the floor [m].")
     ] = 0.55,
     workers: Annotated[
-        int, typer.Option(min=0, help="Number of processes; 0: one per processor, 1: this process only.")
+        int, typer.Option(min=0, max=1024, help="Number of processes; 0: one per processor, 1: this process only.")
     ] = 1,
     time_limit: Annotated[float, typer.Option(min=0.0, help="Time limit of the 0-1 program [s].")] = 30.0,
     exact: Annotated[

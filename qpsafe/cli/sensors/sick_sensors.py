@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import console, progress_bar, show_matrix, verdict
+from qpsafe.errors import ConfigurationError
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -15,12 +16,16 @@ if TYPE_CHECKING:
 
     from qpsafe.sim.sick.matrix import Result
 
+WHERE = "qpsafe sick-sensors"
+
 
 def sick_sensors(
     moments: Annotated[
         int, typer.Option(min=1, max=200, help="Number of random moments in the first experiment.")
     ] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the moments and of the spots that fall sick.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**53, help="Seed of the moments and of the spots that fall sick.")
+    ] = 0,
     sensor: Annotated[
         str,
         typer.Option(
@@ -29,7 +34,7 @@ def sick_sensors(
         ),
     ] = "ideal",
     jobs: Annotated[
-        int, typer.Option(min=1, help="Number of processes; by default one per processor.")
+        int, typer.Option(min=1, max=1024, help="Number of processes; by default one per processor.")
     ] = os.cpu_count() or 1,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON to standard output.")] = False,
 ) -> None:
@@ -41,12 +46,21 @@ def sick_sensors(
     screen = console(json)
     from qpsafe.robot.loader import load_robot
     from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
+    from qpsafe.sim.ranging.sets import sensor_kinds
     from qpsafe.sim.sick.matrix import run_matrix
+
+    try:
+        kinds = sensor_kinds(sensor)
+    except ConfigurationError as wrong:
+        raise ConfigurationError(WHERE, "--sensor", sensor, wrong.expected) from None
+    if kinds.spots == "perfect":
+        raise ConfigurationError(WHERE, "--sensor", sensor, "sensors that can fall sick, such as ideal or sharp")
+    experiment = FixedExperiment(load_robot("irb140"), sensor=sensor)
 
     with progress_bar(screen) as progress:
         task = progress.add_task(counted(moments, "moment"), total=None)
         results = run_matrix(
-            FixedExperiment(load_robot("irb140"), sensor=sensor),
+            experiment,
             moments,
             seed,
             jobs=jobs,

@@ -14,6 +14,9 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
+from qpsafe.irc5.kinds import of_kind, to_call
+from qpsafe.text.given import number
+
 #: More bytes than this never wait.
 MOST = 1 << 22
 
@@ -29,12 +32,18 @@ class Outlet:
     Attributes:
         failure: Why nothing can be written any more, empty while it can.
         lost: How many pieces were not written as a whole.
+
+    Raises:
+        ConfigurationError: `write` cannot be called, the name is no text, or `due` no finite number > 0.
     """
 
     encoding = "utf-8"
 
     def __init__(self, write: Callable[[Any], int], name: str, due: float = 1.0) -> None:
-        self._put, self.name, self.due = write, name, due
+        to_call("Outlet", "write", write)
+        of_kind("Outlet", "name", name, str)
+        self._put, self.name = write, name
+        self.due = number("Outlet", "due", due, "a finite time > 0 [s]", above=0.0)
         self.failure, self.lost = "", 0
         self._tty = False
         self._queue: SimpleQueue[tuple[bytes, bool] | None] = SimpleQueue()

@@ -24,6 +24,7 @@ from contextlib import suppress
 from types import TracebackType
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import number, whole
 
 _BEAT, _ASKED, _WORST, _PULSE = range(4)  # places in the page, 8 bytes each: times and ages [ns]; turns of the watchdog
 _PAGE = 4096
@@ -38,17 +39,15 @@ class Watchdog:
     Args:
         limit: Age of the last heartbeat at which a stop is asked for [s].
         grace: Further time until the process is killed [s].
-        priority: Real-time priority to try for the watchdog's process; 0 for none.
+        priority: Real-time priority to try for the watchdog's process, up to 99; 0 for none.
 
     Raises:
-        ConfigurationError: A time is not above 0; entering: its process does not start.
+        ConfigurationError: A time is not above 0, the priority is none; entering: its process does not start.
     """
 
     def __init__(self, limit: float = 0.1, grace: float = 1.0, priority: int = 0) -> None:
-        for name, value in (("limit", limit), ("grace", grace)):
-            if not 0.0 < value < 3600.0:
-                raise ConfigurationError("Watchdog", name, value, "more than 0, less than 3600 s")
-        self.limit, self.grace, self._priority = limit, grace, priority
+        self.limit, self.grace = _time("limit", limit), _time("grace", grace)
+        self._priority = whole("Watchdog", "priority", priority, "a priority, 0 to 99", 0, 99)
         self._process: subprocess.Popen | None = None
         self._pulse, self._asked_at, self._still = 0, 0.0, 0.0
 
@@ -118,6 +117,14 @@ class Watchdog:
         return f"watchdog: its process has stood still for {_STILL:g} s" if self._still > _STILL else ""
 
 
+def _time(key: str, value: float) -> float:
+    expected = "more than 0, less than 3600 s"
+    found = number("Watchdog", key, value, expected, above=0.0)
+    if not found < 3600.0:
+        raise ConfigurationError("Watchdog", key, value, expected)
+    return found
+
+
 def watch(descriptor: int, parent: int, limit: float, grace: float) -> int:
     """The watchdog's process: returns its exit code when the loop's process is gone or was killed.
 
@@ -159,8 +166,8 @@ def _say(words: str) -> None:
 if __name__ == "__main__":
     from qpsafe.irc5.process.requests import LEAVE
 
-    for number in LEAVE:  # the loop's to answer, and it must be watched while it brakes; it ends with the loop
-        signal.signal(number, signal.SIG_IGN)
+    for each in LEAVE:  # the loop's to answer, and it must be watched while it brakes; it ends with the loop
+        signal.signal(each, signal.SIG_IGN)
     if int(sys.argv[5]) > 0:
         from qpsafe.irc5.process.realtime import fifo
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.reference import JointReference, ServoGains
+from qpsafe.text.given import numbers
 
 Array = NDArray[np.float64]
 
@@ -109,12 +110,9 @@ def _diagonal(name: str, matrix: Array) -> Array:
 
 
 def _numbers(key: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Array:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.zeros(())
+    expected = "finite numbers, one a joint" if shape is None else f"finite numbers of shape {shape}"
+    array = numbers("GearRatios", key, values, expected)
     fits = array.ndim == 1 and len(array) > 0 if shape is None else array.shape == shape
     if not (fits and np.isfinite(array).all()):
-        expected = "finite numbers, one a joint" if shape is None else f"finite numbers of shape {shape}"
         raise ConfigurationError("GearRatios", key, values, expected)
     return array

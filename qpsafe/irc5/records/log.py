@@ -14,9 +14,11 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from qpsafe.errors import ConfigurationError, QpsafeError
+from qpsafe.irc5.kinds import flag, of_kind
 from qpsafe.irc5.process.outlet import Outlet
 from qpsafe.irc5.records.formats import BinaryFormat, CsvFormat, ReferenceFormat
 from qpsafe.reference import JointReference
+from qpsafe.text.given import whole
 
 #: Records between two flushes to the operating system: a second of references.
 FLUSH_EVERY = 250
@@ -28,6 +30,12 @@ class ReferenceLogError(QpsafeError, ValueError):
 
 #: Ending of the name -> format.
 FORMATS: dict[str, ReferenceFormat] = {".csv": CsvFormat(), ".qpref": BinaryFormat()}
+
+
+def _path(value: str | Path) -> Path:
+    if not isinstance(value, str | os.PathLike):
+        raise ConfigurationError("reference log", "path", value, "the name of a file")
+    return Path(value)
 
 
 def _format(path: Path) -> ReferenceFormat:
@@ -51,21 +59,21 @@ class ReferenceWriter:
         count: References taken so far.
 
     Raises:
-        ConfigurationError: The ending is another one, or n is no positive number.
+        ConfigurationError: The name or its ending is another one, n is no number of joints, or `beside` neither True
+            nor False.
         OSError: The file cannot be made.
     """
 
     def __init__(self, path: str | Path, n: int, beside: bool = False) -> None:
-        self.path = Path(path)
+        self.path = _path(path)
         self.part = self.path.with_name(self.path.name + ".part")
-        self.n = n
         self.count = 0
         self._format = _format(self.path)
-        if not (isinstance(n, int) and 0 < n < 256):
-            raise ConfigurationError("reference log", "n", n, "a number of joints, 1 to 255")
+        self.n = whole("reference log", "n", n, "a number of joints, 1 to 255", 1, 255)
+        flag("reference log", "beside", beside)
         self._file = self.part.open("wb", buffering=0)
         self._outlet = Outlet(self._file.write, "log", due=5.0) if beside else None
-        self._kept = bytearray(self._format.header(n))
+        self._kept = bytearray(self._format.header(self.n))
         self._hand_over()
 
     def write(self, reference: JointReference) -> None:
@@ -128,13 +136,17 @@ def write_references(path: str | Path, references: Iterable[JointReference]) -> 
     """Write a log, whole or not at all: after an error nothing is left, and an older file of that name stays.
 
     Raises:
-        ConfigurationError: The name has another ending, or there is no reference to tell the number of joints.
+        ConfigurationError: The name is none or has another ending, something is no reference, or there is none to tell
+            the number of joints.
         ValueError: A reference has another number of joints than the first one.
     """
+    _format(_path(path))
+    of_kind("reference log", "references", references, Iterable)
     references = list(references)
-    _format(Path(path))
     if not references:
         raise ConfigurationError("reference log", "references", references, "at least one")
+    for reference in references:
+        of_kind("reference log", "references", reference, JointReference)
     writer = ReferenceWriter(path, len(references[0].q))
     try:
         with writer:
@@ -161,9 +173,9 @@ def read_references(path: str | Path) -> ReferenceLog:
 
     Raises:
         ReferenceLogError: It is none, or is damaged elsewhere than at its very end.
-        ConfigurationError: The name has another ending.
+        ConfigurationError: The name is none, or has another ending.
     """
-    path = Path(path)
+    path = _path(path)
     kind, data = _format(path), path.read_bytes()
     try:
         references, used = kind.read(data)

@@ -36,3 +36,38 @@ def receive(entrance: socket.socket, size: int) -> tuple[bytes, Any, int]:
             seconds, nanos = _TIMESPEC.unpack_from(note)
             return data, sender, seconds * 1_000_000_000 + nanos
     return data, sender, time.time_ns()
+
+
+class Waits:
+    """How long datagrams have waited in a socket: never less than they have, whatever is done to the clocks.
+
+    The kernel's times are of the real-time clock, which may be set at any moment; by the monotonic clock it is known
+    only that what is read now has come since the socket was last empty. Where these differ, a datagram is taken for
+    as old as it can be. So it is where the kernel tells nothing: what is not before the look at the clocks was noted
+    when it was read.
+
+    Args:
+        entrance: The socket, before anything can come.
+    """
+
+    def __init__(self, entrance: socket.socket) -> None:
+        ask_for_times(entrance)
+        self._now = self._empty = time.monotonic_ns()
+        self._ahead = self._most_ahead = time.time_ns() - self._now  # of the real-time clock [ns]
+
+    def look(self) -> None:
+        """Look at the clocks; to be called before datagrams are read."""
+        self._now = time.monotonic_ns()
+        self._ahead = time.time_ns() - self._now
+        self._most_ahead = max(self._most_ahead, self._ahead)
+
+    def of(self, arrived: int) -> float:
+        """How long a datagram had waited when it was looked at the clocks [s]; `arrived` as `receive` tells it [ns]."""
+        most = self._now - self._empty
+        waited = self._now + self._most_ahead - arrived
+        known = arrived < self._now + self._ahead and waited < most
+        return 1e-9 * (waited if known else most)
+
+    def emptied(self) -> None:
+        """There was no datagram left."""
+        self._empty, self._most_ahead = self._now, self._ahead

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.text.given import parts, whole
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ class Axes:
         from_wire: The inverse (n,).
 
     Raises:
-        ConfigurationError: A place is no joint, or there twice, or more than six joints are left.
+        ConfigurationError: The number of joints is none, a place is no joint or there twice, or more than six joints
+            are left.
     """
 
     n: int
@@ -50,18 +52,24 @@ class Axes:
     from_wire: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        outer = list(range(INNER, self.n) if self.external is None else self.external)
+        whole("Axes", "n", self.n, "a number of joints, 0 to 255", 0, 255)
+        outer = list(range(INNER, self.n)) if self.external is None else self._places("external")
         inner = [place for place in range(self.n) if place not in outer]
-        if len(set(outer)) != len(outer) or not set(outer) <= set(range(self.n)):
-            raise ConfigurationError("Axes", "external", self.external, f"different places from 0 to {self.n - 1}")
         if len(inner) > INNER:
             expected = f"at least {self.n - INNER} of {counted(self.n, 'joint')}: EGM has six places for the others"
             raise ConfigurationError("Axes", "external", self.external, expected)
         object.__setattr__(self, "inner", np.array(inner, dtype=np.intp))
         object.__setattr__(self, "outer", np.array(outer, dtype=np.intp))
-        slides = np.isin(np.arange(self.n), list(self.linear))
+        slides = np.isin(np.arange(self.n), self._places("linear"))
         object.__setattr__(self, "to_wire", np.where(slides, 1e3, 180.0 / np.pi))
         object.__setattr__(self, "from_wire", np.where(slides, 1e-3, np.pi / 180.0))
+
+    def _places(self, key: str) -> list[int]:
+        given, expected = getattr(self, key), f"different places from 0 to {self.n - 1}"
+        found = [whole("Axes", key, place, expected, 0, self.n - 1) for place in parts("Axes", key, given, expected)]
+        if len(set(found)) != len(found):
+            raise ConfigurationError("Axes", key, given, expected)
+        return found
 
     def write(self, message: Any, values: Array) -> None:
         """Into a message with both lists; (n,) in the wire's units."""

@@ -110,7 +110,9 @@ class LaserScanner:
         if not (hasattr(scan, "angle_min") and hasattr(scan, "angle_increment")):
             return True
         try:
-            rays = np.array([0, len(self.sensor) // 2, len(self.sensor) - 1])
+            rays = np.arange(
+                len(self.sensor)
+            )  # all of them: a whole turn the other way round begins, ends and halves alike
             angles = float(scan.angle_min) + float(scan.angle_increment) * rays
         except (TypeError, ValueError, OverflowError):
             return False

@@ -134,7 +134,9 @@ class Vl53l5cx:
         near[~seen & ~nothing] = np.nan
         zones = self._zones
         sigma = None if range_sigma_mm is None else numbers(range_sigma_mm, count)
-        if sigma is not None and sigma.shape == distance.shape:
+        if range_sigma_mm is not None and (sigma is None or sigma.shape != distance.shape):
+            return says_nothing(sensor, stamp)
+        if sigma is not None:
             found = np.take_along_axis(sigma, which, axis=1)[:, 0]
             # cut off to whole millimetres; what is no number tells as little as no number
             found = np.where(seen & (found >= 0) & (found < np.inf), np.maximum(found, 1), sensor.sigma / self._scale)

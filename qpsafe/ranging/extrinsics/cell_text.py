@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.cell_cameras import quaternion_of
-from qpsafe.text.lines import key_lines
+from qpsafe.text.lines import key_lines, toml_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +42,7 @@ def with_pose(text: str, number: int, pose: NDArray[np.float64], remark: str = "
     Raises:
         ConfigurationError: The camera does not stand under a heading of its own.
     """
-    lines, places = text.splitlines(), key_lines(text)
+    lines, places = toml_lines(text), key_lines(text)
     name = ("camera", number, "name")
     if name not in places:
         raise ConfigurationError("cell", f"camera[{number}]", "not under a heading", "a table under [[camera]]")

@@ -63,7 +63,11 @@ def load_recording(path: str | Path, sensor: RangeSensor, robot: Robot) -> Recor
         stacked = {}
         for key in tables[0]:
             try:
-                stacked[key] = tables[0][key] if key == "scale" else np.stack([table[key] for table in tables])
+                stacked[key] = np.stack([table[key] for table in tables])
+                if key == "scale":
+                    if not (stacked[key] == stacked[key][:1]).all():
+                        raise ValueError
+                    stacked[key] = stacked[key][0]
             except (KeyError, ValueError):
                 raise ConfigurationError(path, key, "not the same in all files", "one shape") from None
         table = stacked

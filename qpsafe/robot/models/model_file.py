@@ -58,9 +58,8 @@ def read_model(
         RobotFileError: The file is neither, cannot be parsed, or something in it is wrong; names the place.
     """
     root = _parse(path)
-    if root.tag == "robot":
-        return _read_urdf(path, root, hold or {}, units, wanted)
-    return _read_mjcf(path, root, hold or {}, units, wanted)
+    read = _read_urdf if root.tag == "robot" else _read_mjcf
+    return read(path, root, {} if hold is None else hold, units, wanted)
 
 
 def is_urdf(path: Path) -> bool:

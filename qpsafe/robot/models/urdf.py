@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import coal  # type: ignore[import-untyped]
+import numpy as np
 import pinocchio as pin
 
 from qpsafe.errors import RobotFileError
 from qpsafe.robot.joint_choice import HINGE, SLIDE, Coupling, FoundJoint
 from qpsafe.robot.models.mjcf import ENDLESS
 from qpsafe.robot.models.names import unique_name
-from qpsafe.robot.models.urdf_check import check_urdf, package_folders
+from qpsafe.robot.models.urdf_check import check_urdf
+from qpsafe.text.words import counted
 
 _KINDS = {"revolute": HINGE, "continuous": HINGE, "prismatic": SLIDE}
 
@@ -42,10 +46,17 @@ class UrdfFile:
         for element in elements.values():
             _state_limits(element)
         self.joints = _found(elements)
-        for link in root.findall("link"):
-            for picture in link.findall("visual"):  # not needed, and a mistake in it would be the whole file's
-                link.remove(picture)
-        taken = {link.get("name", "") for link in root.findall("link")} | {"universe"}
+        for parent, tag in [(root, "material"), *((link, "visual") for link in root.findall("link"))]:
+            for picture in parent.findall(tag):  # not needed, and a mistake in it would be the whole file's
+                parent.remove(picture)
+        links = {link.get("name", ""): link for link in root.findall("link")}
+        self._meshes = [
+            (name, mesh.get("filename", ""))
+            for name, link in links.items()
+            for mesh in link.iterfind("collision/geometry/mesh")
+        ]
+        self._parts = {name: _parts(link) for name, link in links.items()}
+        taken = {*links, "universe"}
         self._names = {name: unique_name(name, "joint", taken) for name in elements}
         for name, element in elements.items():
             element.set("name", self._names[name])
@@ -69,19 +80,53 @@ class UrdfFile:
         return model
 
     def geometry(self, held: Mapping[str, float]) -> Any:
-        """pinocchio's collision geometry for the same model."""
+        """pinocchio's collision geometry for the same model.
+
+        Raises:
+            RobotFileError: pinocchio cannot read a mesh, or leaves out a shape.
+        """
         full = self._full()
-        folders = [str(self._path.parent), *package_folders(self._path)]
-        geometry = pin.buildGeomFromUrdfString(full, self._text, pin.GeometryType.COLLISION, package_dirs=folders)
+        try:
+            geometry = pin.buildGeomFromUrdfString(full, self._text, pin.GeometryType.COLLISION)
+        except (ValueError, RuntimeError):
+            self._check_meshes()
+            raise
+        read = Counter(full.frames[item.parentFrame].name for item in geometry.geometryObjects)
+        for link, (shapes, _) in self._parts.items():
+            if read[link] != shapes:
+                expected = f"{counted(shapes, 'shape')}, as in the file; pinocchio reads {read[link]}"
+                raise RobotFileError(self._path, f"link {link}: collision", read[link], expected)
         ids, values = self._held(full, held)
         return pin.buildReducedModel(full, geometry, ids, values)[1] if ids else geometry
 
-    def _full(self) -> Any:
+    def _read(self) -> Any:
         try:
             return pin.buildModelFromXML(self._text)
         except (ValueError, RuntimeError, IndexError) as error:
             expected = f"a model that pinocchio can read ({error})"
             raise RobotFileError(self._path, "file", self._path.name, expected) from error
+
+    def _full(self) -> Any:
+        """pinocchio's model of the whole file, with every mass that stands in it."""
+        full = self._read()
+        links = [frame for frame in full.frames if frame.name in self._parts]
+        for joint, inertia in enumerate(full.inertias):
+            masses = {link.name: self._parts[link.name][1] for link in links if link.parentJoint == joint}
+            mass = sum(masses.values())
+            if not abs(inertia.mass - mass) <= 1e-9 * mass:
+                named = ", ".join(name for name, own in masses.items() if own > 0.0)
+                expected = f"{mass:g} kg, as in the file; pinocchio reads {inertia.mass:g} kg"
+                raise RobotFileError(self._path, f"link {named}: mass", inertia.mass, expected)
+        return full
+
+    def _check_meshes(self) -> None:
+        """Name the mesh that cannot be read."""
+        for link, mesh in self._meshes:
+            try:
+                coal.MeshLoader().load(mesh, np.ones(3))
+            except (ValueError, RuntimeError) as error:
+                expected = f"a mesh that can be read ({' '.join(str(error).split())})"
+                raise RobotFileError(self._path, f"link {link}: collision mesh", mesh, expected) from error
 
     def _held(self, full: Any, held: Mapping[str, float]) -> tuple[list[int], Any]:
         """pinocchio's numbers of the joints that are held, and a configuration in which they are."""
@@ -97,9 +142,12 @@ class UrdfFile:
 def _state_limits(joint: Element) -> None:
     """Make a continuous joint a revolute one of many turns; without a <limit> the reader would refuse the whole file.
 
-    What a <limit> leaves out or calls infinite becomes 0, "not stated".
+    What a <limit> leaves out or calls infinite becomes 0, "not stated". That of a joint that is held has no meaning.
     """
     limit = joint.find("limit")
+    if joint.get("type") not in _KINDS and limit is not None:
+        joint.remove(limit)
+        return
     if joint.get("type") == "continuous":
         joint.set("type", "revolute")
         if limit is None:
@@ -137,6 +185,12 @@ def _found(elements: Mapping[str, Element]) -> list[FoundJoint]:
             follows = Coupling(mimic.get("joint", ""), values)
         found.append(FoundJoint(name, _KINDS.get(kind, kind), above(name), ends[name][0], lower, upper, 0.0, follows))
     return found
+
+
+def _parts(link: Element) -> tuple[int, float]:
+    """How many collision shapes a link has, and its mass [kg]."""
+    mass = link.find("inertial/mass")
+    return len(link.findall("collision")), 0.0 if mass is None else float(mass.get("value", "0"))
 
 
 def _link(joint: Element, role: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -10,13 +11,21 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from qpsafe.errors import RobotFileError
+from qpsafe.robot.models.collada import Head, head_of, said_of
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _TURN_OR_SLIDE = ("revolute", "continuous", "prismatic")
+_VERSIONS = ("1.0", "1.1", "1.2")
+_LARGEST_AXIS = 1e9  # beyond its inverse and this no length of a vector is sure
+# what the reader takes for a number; Python would take 1_0 and other alphabets' digits too
+_NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
 
 
 def check_urdf(path: Path, root: Element) -> list[str]:
     """Check names, tree, numbers and mesh files of a URDF; that nothing of xacro is left in it.
+
+    Written in the element as the reader wants it, which leaves out a whole link's shapes or mass otherwise: blanks in
+    numbers, the whole paths of meshes, and the version, where a capsule or a quaternion needs it.
 
     Returns:
         Notes on what is doubtful.
@@ -27,23 +36,28 @@ def check_urdf(path: Path, root: Element) -> list[str]:
     _check_expanded(path, root)
     if not root.get("name"):
         raise RobotFileError(path, "robot: name", root.get("name"), "a name")
+    _check_version(path, root)
     links = _named(path, root, "link")
     joints = _named(path, root, "joint")
     if not links:
         raise RobotFileError(path, "link", None, "at least one <link>")
+    if "universe" in links:
+        raise RobotFileError(path, "link universe: name", "universe", "another name: that is the world's")
     _check_tree(path, links, joints)
     for name, joint in joints.items():
         _check_joint(path, f"joint {name}", joint, joints)
-    empty = []
+    empty: list[str] = []
+    heads: dict[str, Head] = {}
     for name, link in links.items():
         if not _check_inertia(path, f"link {name}", link):
             empty.append(name)
-        _check_shapes(path, f"link {name}", link)
+        heads |= _check_shapes(path, f"link {name}", link)
     moved = {joint.find("child").get("link") for joint in joints.values() if joint.get("type") != "fixed"}  # type: ignore[union-attr]
     empty = [name for name in empty if name in moved]
+    notes = said_of(heads)
     if empty:
-        return [f"no mass or inertia is given for what moves: {', '.join(empty)} (only simulations need it)"]
-    return []
+        notes.append(f"no mass or inertia is given for what moves: {', '.join(empty)} (only simulations need it)")
+    return notes
 
 
 def package_folders(path: Path) -> list[str]:
@@ -67,6 +81,15 @@ def _check_expanded(path: Path, root: Element) -> None:
             if "${" in text or "$(" in text:
                 where = f"<{tag}> {element.get('name', '')}".strip()
                 raise RobotFileError(path, f"{where}: {key}", text.strip(), run)
+
+
+def _check_version(path: Path, root: Element) -> None:
+    """Check the version, and make it the one that capsules and quaternions need."""
+    version = root.get("version")
+    if version is not None and version.strip() not in _VERSIONS:
+        raise RobotFileError(path, "robot: version", version, "one of " + ", ".join(_VERSIONS))
+    if root.find("link/collision/geometry/capsule") is not None or any(o.get("quat_xyzw") for o in root.iter("origin")):
+        root.set("version", _VERSIONS[-1])
 
 
 def _named(path: Path, root: Element, tag: str) -> dict[str, Element]:
@@ -131,15 +154,16 @@ def _check_joint(path: Path, where: str, joint: Element, joints: dict[str, Eleme
         raise RobotFileError(path, f"{where}: type", kind, "one of " + ", ".join(JOINT_TYPES))
     axis = joint.find("axis")
     if axis is not None:
-        values = _numbers(path, f"{where}: axis", axis.get("xyz"), 3)
-        if kind in _TURN_OR_SLIDE and not np.linalg.norm(values) > 1e-9:
-            raise RobotFileError(path, f"{where}: axis", axis.get("xyz"), "a direction, not three zeros")
+        largest = np.abs(_numbers(path, f"{where}: axis", axis, "xyz", 3)).max()
+        if kind in _TURN_OR_SLIDE and not 1.0 / _LARGEST_AXIS < largest < _LARGEST_AXIS:
+            expected = "a direction: its largest number above 1e-9 and below 1e9, best of length 1"
+            raise RobotFileError(path, f"{where}: axis", axis.get("xyz"), expected)
     _check_origin(path, where, joint)
     for tag, keys in _FIGURES.items():
         for element in joint.findall(tag):
             for key, needed in keys.items():
                 if needed or element.get(key) is not None:
-                    _numbers(path, f"{where}: {tag} {key}", element.get(key), 1)
+                    _numbers(path, f"{where}: {tag} {key}", element, key, 1)
             if tag == "dynamics" and not set(keys) & set(element.keys()):
                 raise RobotFileError(path, f"{where}: dynamics", None, "damping or friction")
             source = joints.get(element.get("joint", ""))
@@ -150,21 +174,34 @@ def _check_joint(path: Path, where: str, joint: Element, joints: dict[str, Eleme
     if kind in ("revolute", "prismatic"):
         if limit is None:
             raise RobotFileError(path, f"{where}: limit", None, f"a <limit>: the joint is {kind}")
-        low, high = (_numbers(path, f"{where}: limit {key}", limit.get(key, "0"), 1)[0] for key in ("lower", "upper"))
+        low, high = (
+            0.0 if limit.get(key) is None else _numbers(path, f"{where}: limit {key}", limit, key, 1)[0]
+            for key in ("lower", "upper")
+        )
         if not low <= high:
             raise RobotFileError(path, f"{where}: limit lower", float(low), f"at most upper = {float(high)!r}")
     if limit is not None:
         for key in ("velocity", "effort"):
             text = limit.get(key)
-            if text is not None and _numbers(path, f"{where}: limit {key}", text, 1, finite=False)[0] < 0.0:
+            if text is not None and _numbers(path, f"{where}: limit {key}", limit, key, 1, finite=False)[0] < 0.0:
                 raise RobotFileError(path, f"{where}: limit {key}", text, "a number >= 0")
 
 
 def _check_origin(path: Path, where: str, element: Element) -> None:
     origin = element.find("origin")
+    if origin is None:
+        return
     for key in ("xyz", "rpy"):
-        if origin is not None and origin.get(key) is not None:
-            _numbers(path, f"{where}: origin {key}", origin.get(key), 3)
+        if origin.get(key) is not None:
+            _numbers(path, f"{where}: origin {key}", origin, key, 3)
+    text = origin.get("quat_xyzw")
+    if text is not None and (origin.get("rpy") is not None or not text.strip()):
+        raise RobotFileError(path, f"{where}: origin quat_xyzw", text, "four numbers, and no rpy beside them")
+    if (
+        text is not None
+        and not abs(np.linalg.norm(_numbers(path, f"{where}: origin quat_xyzw", origin, "quat_xyzw", 4)) - 1.0) < 1e-3
+    ):
+        raise RobotFileError(path, f"{where}: origin quat_xyzw", text, "a quaternion of length 1")
 
 
 def _check_inertia(path: Path, where: str, link: Element) -> bool:
@@ -174,14 +211,14 @@ def _check_inertia(path: Path, where: str, link: Element) -> bool:
         return False
     _check_origin(path, f"{where}: inertial", inertial)
     element = inertial.find("mass")
-    mass = float(_numbers(path, f"{where}: mass", None if element is None else element.get("value"), 1)[0])
+    mass = float(_numbers(path, f"{where}: mass", element, "value", 1)[0])
     if mass < 0.0:
         raise RobotFileError(path, f"{where}: mass", mass, "a mass >= 0 [kg]")
     element = inertial.find("inertia")
     if element is None:
         raise RobotFileError(path, f"{where}: inertia", None, "an <inertia>, since there is an <inertial>")
     keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    xx, xy, xz, yy, yz, zz = (float(_numbers(path, f"{where}: inertia {k}", element.get(k), 1)[0]) for k in keys)
+    xx, xy, xz, yy, yz, zz = (float(_numbers(path, f"{where}: inertia {k}", element, k, 1)[0]) for k in keys)
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if moments[0] < -1e-9 * max(1.0, moments[2]):
         found = [round(float(m), 9) for m in moments]
@@ -193,7 +230,9 @@ _SHAPES = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "capsule"
 _SHAPES |= {"sphere": {"radius": 1}, "mesh": {}}
 
 
-def _check_shapes(path: Path, where: str, link: Element) -> None:
+def _check_shapes(path: Path, where: str, link: Element) -> dict[str, Head]:
+    """What its meshes state at their heads, by name."""
+    heads: dict[str, Head] = {}
     for collision in link.iterfind("collision"):
         _check_origin(path, f"{where}: collision", collision)
         geometry = collision.find("geometry")
@@ -202,21 +241,28 @@ def _check_shapes(path: Path, where: str, link: Element) -> None:
             found = None if shape is None else shape.tag
             raise RobotFileError(path, f"{where}: collision geometry", found, "one of " + ", ".join(_SHAPES))
         for key, count in _SHAPES[shape.tag].items():
-            if not (_numbers(path, f"{where}: collision {shape.tag} {key}", shape.get(key), count) > 0.0).all():
+            if not (_numbers(path, f"{where}: collision {shape.tag} {key}", shape, key, count) > 0.0).all():
                 raise RobotFileError(path, f"{where}: collision {shape.tag} {key}", shape.get(key), "more than 0 [m]")
         if shape.tag == "mesh":
-            _check_mesh(path, f"{where}: collision mesh", shape)
+            place = _check_mesh(path, f"{where}: collision mesh", shape)
+            heads[place.name] = head_of(path, f"{where}: collision mesh", place)
+    return heads
 
 
-def _check_mesh(path: Path, where: str, mesh: Element) -> None:
+def _check_mesh(path: Path, where: str, mesh: Element) -> Path:
+    """The file of a mesh, by its whole path from now on: it is read later, maybe from another working directory."""
     name = mesh.get("filename")
     if not name:
         raise RobotFileError(path, where, name, "a file name")
-    if not any(place.is_file() for place in _places(path, name)):
+    # os.path, unlike Path, takes no offence at what cannot be a name
+    found = next((place for place in _places(path, name) if os.path.isfile(place)), None)
+    if found is None:
         expected = "a file that is there; looked for it beside the file, and package:// in the folders above it"
         raise RobotFileError(path, where, name, expected)
-    if mesh.get("scale") is not None and not (_numbers(path, f"{where} scale", mesh.get("scale"), 3) != 0.0).all():
+    if mesh.get("scale") is not None and not (_numbers(path, f"{where} scale", mesh, "scale", 3) != 0.0).all():
         raise RobotFileError(path, f"{where} scale", mesh.get("scale"), "three numbers, none of them 0")
+    mesh.set("filename", str(found.absolute()))
+    return found
 
 
 def _places(path: Path, name: str) -> Iterator[Path]:
@@ -227,12 +273,16 @@ def _places(path: Path, name: str) -> Iterator[Path]:
         yield path.parent / name.removeprefix("file://")
 
 
-def _numbers(path: Path, key: str, text: str | None, count: int, finite: bool = True) -> np.ndarray:
-    try:
-        values = np.array([float(word) for word in (text or "").split()])
-    except ValueError:
-        values = np.empty(0)
-    if values.shape != (count,) or (not np.isfinite(values).all() if finite else np.isnan(values).any()):
+def _numbers(
+    path: Path, key: str, element: Element | None, attribute: str, count: int, finite: bool = True
+) -> np.ndarray:
+    """The numbers of an attribute, which has single blanks between them from now on: the reader knows no other."""
+    text = None if element is None else element.get(attribute)
+    words = (text or "").split()
+    values = np.array([float(word) for word in words if _NUMBER.fullmatch(word)])
+    read = len(words) == count == len(values) and (np.isfinite(values).all() if finite else not np.isnan(values).any())
+    if element is None or not read:
         what = "a finite number" if count == 1 else f"{count} finite numbers"
         raise RobotFileError(path, key, text, what)
+    element.set(attribute, " ".join(words))
     return values

@@ -28,6 +28,7 @@ from qpsafe.robot.robot_file.parameter_tables import (
     Table,
 )
 from qpsafe.text.complaints import expected_words
+from qpsafe.text.lines import toml_lines
 from qpsafe.text.toml_parse import read_bounded, toml_table
 from qpsafe.text.words import counted
 
@@ -271,7 +272,7 @@ def _known_frames(path: Path, key: str, names: list[str], frames: dict[str, str]
 def _syntax_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> RobotFileError:
     """Point at the line of the file that is no TOML."""
     place = re.search(r"line (\d+)", str(error))
-    lines = text.splitlines()
+    lines = toml_lines(text)
     number = int(place.group(1)) if place else len(lines)
     line = lines[number - 1].strip() if 0 < number <= len(lines) else ""
     return RobotFileError(path, f"line {number}", line, f"valid TOML ({error})")

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from qpsafe.robot.robot import Robot
+from qpsafe.text.toml_string import toml_string
 
 
 def starting_robot_toml(
@@ -19,6 +24,8 @@ def starting_robot_toml(
 ) -> str:
     """The text of a robot.toml that says what was found in a bare model file and what was assumed.
 
+    Figures are rounded for a person, in degrees; all are whole, in radians, where a range or a speed would vanish.
+
     Args:
         robot: Loaded from the model file alone.
         folder: Where the file will stand; the model is named relative to it where it is below.
@@ -27,44 +34,46 @@ def starting_robot_toml(
     """
     model = robot.model_path.resolve()
     name = os.path.relpath(model, folder.resolve()) if folder.resolve() in model.parents else str(model)
+    limits = {key: getattr(robot, key) for key in ("lower", "upper", "max_velocity", "max_acceleration")}
+    figure = _rounded if _readable(limits, robot.sliding) else _whole
     lines = [
-        f"# {robot.title}: written by `qpsafe robots add` from {robot.model_path.name}. Check every value, above all:",
-        *(f"# - {note}" for note in (robot.notes if assumed is None else assumed)),
+        _comment(f"{robot.title}: written by `qpsafe robots add` from {robot.model_path.name}."),
+        "# Check every value, above all:",
+        *(_comment(f"- {note}") for note in (robot.notes if assumed is None else assumed)),
         "",
-        f"name = {_text(robot.name)}",
-        f"title = {_text(robot.title)}",
-        f"model = {_text(name)}",
+        f"name = {toml_string(robot.name)}",
+        f"title = {toml_string(robot.title)}",
+        f"model = {toml_string(name)}",
         '# spots = "spots.toml"             # distance sensors, if it carries any'
         if spots is None
-        else f"spots = {_text(spots)}",
-        f"home = [{', '.join(map(_figure, robot.home, robot.sliding))}]",
+        else f"spots = {toml_string(spots)}",
+        f"home = [{', '.join(map(figure, robot.home, robot.sliding))}]",
         "",
         "[units]",
         'length = "m"',
-        'angle = "deg"',
+        f"angle = {toml_string('deg' if figure is _rounded else 'rad')}",
         'mass = "kg"',
         'time = "s"',
         "",
     ]
-    limits = {key: getattr(robot, key) for key in ("lower", "upper", "max_velocity", "max_acceleration")}
     for i, joint in enumerate(robot.joint_names):
-        lines += [f"[joints.{_text(joint)}]"]
+        lines += [f"[joints.{toml_string(joint)}]"]
         for key in limits:
-            lines += [f"{key} = {_figure(limits[key][i], robot.sliding[i])}"]
+            lines += [f"{key} = {figure(limits[key][i], robot.sliding[i])}"]
         lines += [""]
     if robot.held:
         lines += ["# Joints that are held in place, and where (angle or length).", "[hold]"]
-        lines += [f"{_text(name)} = {_figure(*joint)}" for name, joint in robot.held.items()]
+        lines += [f"{toml_string(name)} = {figure(*joint)}" for name, joint in robot.held.items()]
         lines += [""]
     lines += ["# Name in qpsafe -> site, body or link of the model. Rename as you like.", "[frames]"]
-    lines += [f"{_text(frame)} = {_text(frame)}" for frame in robot.frame_names]
+    lines += [f"{toml_string(frame)} = {toml_string(frame)}" for frame in robot.frame_names]
     lines += [
         "",
         "# The segments whose motion makes the danger field, eq. (4), along the joint tree.",
         "[wire]",
         "links = [",
     ]
-    lines += [f"    [{_text(start)}, {_text(end)}]," for start, end in robot.wire_frames]
+    lines += [f"    [{toml_string(start)}, {toml_string(end)}]," for start, end in robot.wire_frames]
     lines += ["]", ""]
     several = len(robot.tool_frames) > 1
     for frame in robot.tool_frames:
@@ -73,8 +82,8 @@ def starting_robot_toml(
         lines += [
             "# Assumed: the tool ends where the wire ends. Its mass is for people only.",
             "[[tool]]" if several else "[tool]",
-            f"frame = {_text(frame)}",
-            f"mounted_on = {_text(mount)}",
+            f"frame = {toml_string(frame)}",
+            f"mounted_on = {toml_string(mount)}",
             f"offset = [{', '.join(repr(round(value, 9) + 0.0) for value in offset)}]",
             "mass = 0.0",
             "",
@@ -96,12 +105,26 @@ def _offset(robot: Robot, mount: str, frame: str) -> list[float]:
     return [float(value) for value in offset]
 
 
-def _figure(value: float, sliding: bool) -> str:
+def _readable(limits: Mapping[str, NDArray[np.float64]], sliding: NDArray[np.bool_]) -> bool:
+    """Whether ranges, speeds and accelerations are still there after rounding."""
+    read = {
+        key: np.array([float(_rounded(*joint)) for joint in zip(values, sliding, strict=True)])
+        for key, values in limits.items()
+    }
+    spans = (read["upper"] - read["lower"], read["max_velocity"], read["max_acceleration"])
+    return all(bool((span > 0.0).all()) for span in spans)
+
+
+def _rounded(value: float, sliding: bool) -> str:
     """Degrees, or metres where a joint slides."""
     return repr(round(float(value), 9) + 0.0) if sliding else repr(round(math.degrees(value), 6) + 0.0)
 
 
-def _text(value: str) -> str:
-    """A TOML string (also fine as a key)."""
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
+def _whole(value: float, _sliding: bool) -> str:
+    """Radians, or metres where a joint slides, to the last digit."""
+    return repr(float(value) + 0.0)
+
+
+def _comment(words: str) -> str:
+    """A comment in one line, whatever names stand in it."""
+    return "# " + re.sub(r"[\x00-\x1f\x7f]", " ", words)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from qpsafe.errors import ConfigurationError, RobotFileError
-from qpsafe.sensing.sharp import SharpConverter, SharpCurve
-from qpsafe.text.complaints import expected_words
-from qpsafe.text.toml_parse import read_bounded, toml_table
+from qpsafe.sensing.sharp import RANGE, SharpConverter, SharpCurve
+from qpsafe.text.toml_string import toml_string
+from qpsafe.text.toml_text import TomlText
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -26,13 +26,14 @@ Array = NDArray[np.float64]
 #: The file in the robot's folder that `load_calibration` reads.
 FILE_NAME = "calibration.toml"
 #: Range of distances that is fitted, the paper's [m].
-FITTED = (0.20, 0.80)
+FITTED = RANGE
 FEWEST = 6  # pairs a spot: twice the number of parameters
 #: Farther off the curve than this, and than this many robust standard deviations of the others, a pair is wrong [m].
 WRONG, DEVIATIONS = 0.03, 6.0
 MOST_WRONG = 0.1  # share of a spot's pairs that may be wrong
 #: Voltages over those of a typical unit: what units of this sensor can differ by.
 TYPICAL = (0.7, 1.4)
+_FALLS = "a voltage that falls with the distance (is m mixed with cm?)"
 
 
 @dataclass(frozen=True)
@@ -106,22 +107,22 @@ def fit_curve(spot: str, distances: ArrayLike, voltages: ArrayLike) -> Fit:
         found = f"{counted(len(d), 'pair')} at {counted(len(np.unique(d)), 'distance')}"
         expected = f"at least {counted(FEWEST, 'pair')} at 4 distances between {FITTED[0]} and {FITTED[1]} m"
         raise ConfigurationError(where, "pairs", found, expected)
-    fit = Fit(spot, _fitted(d, v), d, v, ignored)
+    fit = Fit(spot, _fitted(where, d, v), d, v, ignored)
     for end in (d.argmin(), d.argmax()):  # a wrong pair at an end bends the curve to itself, and the others are off
         rest = np.arange(len(d)) != end
         if len(np.unique(d[rest])) >= 4:
-            other = Fit(spot, _fitted(d[rest], v[rest]), d, v, ignored)
+            other = Fit(spot, _fitted(where, d[rest], v[rest]), d, v, ignored)
             if np.median(np.abs(other.errors)) < 0.5 * np.median(np.abs(fit.errors)):
                 fit = other
     if fit.wrong.any() and fit.few_wrong:  # a robust loss bounds what they do to the curve: now nothing
-        fit = Fit(spot, _fitted(d[~fit.wrong], v[~fit.wrong]), d, v, ignored)
+        fit = Fit(spot, _fitted(where, d[~fit.wrong], v[~fit.wrong]), d, v, ignored)
     if not np.median(np.abs(fit.errors)) <= 0.05:
         worst = f"a median error of {100 * np.median(np.abs(fit.errors)):.3g} cm"
-        raise ConfigurationError(where, "pairs", worst, "a voltage that falls with the distance (is m mixed with cm?)")
+        raise ConfigurationError(where, "pairs", worst, _FALLS)
     return fit
 
 
-def _fitted(d: Array, v: Array) -> SharpCurve:
+def _fitted(where: str, d: Array, v: Array) -> SharpCurve:
     from scipy.optimize import least_squares
 
     start = SharpCurve()
@@ -137,7 +138,10 @@ def _fitted(d: Array, v: Array) -> SharpCurve:
         loss="soft_l1",
         x_scale=(0.1, 0.02, 0.05),
     )
-    return SharpCurve(*(float(value) for value in result.x))
+    try:
+        return SharpCurve(*(float(value) for value in result.x))
+    except ConfigurationError as problem:  # no sensor's: what the pairs say best is not
+        raise ConfigurationError(where, "pairs", f"{problem.key} = {problem.value}", _FALLS) from None
 
 
 def fit_all(pairs: Iterable[tuple[str, float, float]]) -> list[Fit]:
@@ -190,11 +194,10 @@ def calibration_text(fits: Sequence[Fit], sensor: str = "Sharp GP2Y0A02YK") -> s
     lines = [
         "# Written by `qpsafe calibrate`. V(d) = gain/(d + offset) + bias, 0.20 to 0.80 m.",
         "# error_95: 95 % of the pairs are at most this far off [m], those left out that are plainly wrong.",
-        f'sensor = "{sensor}"',
+        f"sensor = {toml_string(sensor)}",
     ]
     for fit in fits:
-        name = fit.spot.replace("\\", "\\\\").replace('"', '\\"')
-        lines += ["", "[[curve]]", f'spot = "{name}"']
+        lines += ["", "[[curve]]", f"spot = {toml_string(fit.spot)}"]
         lines += [f"{key} = {getattr(fit.curve, key)!r}" for key in ("gain", "offset", "bias")]
         lines += [f"error_95 = {fit.error_95:.5f}", f"pairs = {len(fit.distances)}", f"wrong = {fit.wrong.sum()}"]
     return "\n".join(lines) + "\n"
@@ -206,19 +209,16 @@ def read_calibration(path: Path) -> dict[str, SharpCurve]:
     Raises:
         RobotFileError: The file is missing, is no TOML, or a value in it is wrong.
     """
-    try:
-        content = _File.model_validate(toml_table(read_bounded(path)))
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise RobotFileError(path, key, first.get("input"), expected_words(first)) from None
-    except (OSError, ValueError) as error:
-        raise RobotFileError(path, "file", path.name, f"a readable TOML file ({error})") from None
+    text = TomlText.read(path, RobotFileError)
     curves: dict[str, SharpCurve] = {}
-    for item in content.curve:
+    for k, item in enumerate(text.checked(_File).curve):
         if item.spot in curves:
-            raise RobotFileError(path, "curve", item.spot, "one curve a spot")
-        curves[item.spot] = SharpCurve(item.gain, item.offset, item.bias)
+            raise text.wrong(("curve", k, "spot"), item.spot, "one curve a spot")
+        try:
+            curves[item.spot] = SharpCurve(item.gain, item.offset, item.bias)
+        except ConfigurationError as problem:
+            key = (problem.key,) if problem.key in _Curve.model_fields else ()
+            raise text.wrong(("curve", k, *key), problem.value, f"{problem.expected}, of spot {item.spot!r}") from None
     return curves
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
-from qpsafe.errors import ConfigurationError
+from qpsafe.errors import ConfigurationError, in_words
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.laws.hierarchical import HierarchicalLaw
@@ -168,8 +168,12 @@ def _imported(place: str) -> Opponent:
         else:
             loaded = importlib.import_module(module)
         make = getattr(loaded, function)
-    except (ImportError, OSError, AttributeError) as error:
-        raise ConfigurationError("campaign", "controllers", place, f"module:function ({error})") from None
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a user's module may raise anything, even end the process
+        expected = f"module:function or file.py:function ({in_words(error)})"
+        raise ConfigurationError("campaign", "controllers", place, expected) from None
     if not callable(make):
         raise ConfigurationError("campaign", "controllers", place, "a function of the station")
-    return Opponent(place, (make.__doc__ or "a controller of the user's").strip().splitlines()[0], make)
+    said = make.__doc__.strip() if isinstance(make.__doc__, str) else ""
+    return Opponent(place, (said or "a controller of the user's").splitlines()[0], make)

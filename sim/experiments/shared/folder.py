@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, find_robot
 from qpsafe.text.json_text import json_text
+from qpsafe.text.lines import toml_lines
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -102,7 +103,7 @@ def with_keys(text: str, stated: dict[str, str]) -> str | None:
     Returns:
         None where that could not be done by lines.
     """
-    lines = text.splitlines()
+    lines = toml_lines(text)
     for key, value in stated.items():
         top = next((k for k, line in enumerate(lines) if line.lstrip().startswith("[")), len(lines))
         line = f"{key} = {json_text(value, indent=None)}"

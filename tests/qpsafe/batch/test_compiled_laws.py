@@ -104,7 +104,7 @@ def test_laws_that_cannot_be_compiled_are_named(irb140: Any) -> None:
         pass
 
     reasons = {
-        "the law is of another making": [Own(), qpsafe.WeightedLaw(weights=(2.0, 1.0))],
+        "the law is of another making": [Own()],
         "the law has another solver than the own one": [
             qpsafe.WeightedLaw(solver="daqp"), qpsafe.HierarchicalLaw("paper", solver="daqp"),
         ],

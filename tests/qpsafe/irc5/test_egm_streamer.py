@@ -15,7 +15,8 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.irc5 import streamer as module
 from qpsafe.irc5.messages import MAX_SIZE, RobotPacket, SensorPacket, decode_sensor, encode_robot
 from qpsafe.irc5.session import Phase
-from qpsafe.irc5.streamer import EgmStreamer, interface_address, peer_address
+from qpsafe.irc5.streamer import EgmStreamer
+from qpsafe.irc5.transport.addresses import interface_address, peer_address
 from qpsafe.limits import JointLimits
 
 ROBOT = qpsafe.load_robot("irb140")

@@ -194,7 +194,7 @@ def test_laws_are_known_by_their_own_types_only() -> None:
         PAPER: [qpsafe.HierarchicalLaw("paper")],
         NULLSPACE: [qpsafe.NullspaceLaw()],
         WEIGHTED: [qpsafe.WeightedLaw(), qpsafe.WeightedLaw(weights=(3.0, 2.0, 1.0))],
-        OTHER: [Own(), qpsafe.WeightedLaw(weights=(2.0, 1.0)), qpsafe.WeightedLaw(solver="daqp"), None],
+        OTHER: [Own(), qpsafe.WeightedLaw(solver="daqp"), None],
     }
     for kind, laws in known.items():
         assert [kind_of(law, 2) for law in laws] == [kind] * len(laws)

@@ -114,3 +114,27 @@ def test_scans_that_raise_tell_nothing(error: type[Exception]) -> None:
     assert not np.any(scanner.image(SimpleNamespace(**usual | {"angle_min": 10**400}), stamp=0.0).valid)
     header = SimpleNamespace(stamp=Raises(error))
     assert np.isnan(scanner.image(SimpleNamespace(**usual, header=header)).stamp)
+
+
+@pytest.mark.parametrize("rays", [9, 90, 361, 720])
+@pytest.mark.parametrize("turns", [0.25, 1.0, 1.7])
+def test_a_scan_of_other_angles_tells_nothing_and_whole_turns_do_not_matter(rays: int, turns: float) -> None:
+    """Mirrored, begun elsewhere, or wider: also where first, middle and last ray look the same way."""
+    begin, step = -np.pi * turns, 2.0 * np.pi * turns / (rays - 1)
+    scanner = LaserScanner.of("round", message(np.ones(rays), angle_min=begin, angle_increment=step), mount="world")
+    looks = np.exp(1j * (begin + step * np.arange(rays)))
+    others = [(begin + dx, factor * step) for dx in (0.0, 2 * np.pi, 0.3) for factor in (1.0, -1.0, 3.0, 0.5)]
+    for first, each in [*others, (-begin, -step), (begin, step + 2.0 * np.pi)]:
+        image = scanner.image(message(np.ones(rays), angle_min=first, angle_increment=each))
+        same = np.abs(np.exp(1j * (first + each * np.arange(rays))) - looks).max() < 1e-6
+        assert np.asarray(image.valid).all() == same
+        assert np.asarray(image.valid).any() == same
+
+
+@pytest.mark.parametrize("increment", [0.0, -0.0, 1e-9, -1e-300, np.nan])
+def test_rays_that_coincide_are_refused(increment: float) -> None:
+    assert len(RangeSensor.planar("one", 0.3, 0.0, 1)) == 1
+    with pytest.raises(ConfigurationError, match="increment"):
+        RangeSensor.planar("many", 0.3, increment, 181)
+    with pytest.raises(ConfigurationError, match="increment"):
+        LaserScanner.of("many", message(np.ones(RAYS), angle_increment=increment), mount="world")

@@ -107,3 +107,62 @@ def test_who_stood_where_nobody_looks_may_have_come_since(run: Any, eyes: Any) -
         hidden = len(told[-1].near) - loop.controller.ranging._counts.sum()
         assert hidden > 20
         assert np.allclose(told[-1].leads[-hidden:], (k % 5) * DT)
+
+
+@pytest.mark.parametrize("first", ["free", "one zone", "no zone", "none"])
+def test_a_sensor_that_tells_less_leaves_no_less_occupied(run: Any, irb140: Any, first: str) -> None:
+    """One free image, one of a single zone, one that is blind, or none at all; then it is dead, and the robot moves."""
+    pose = np.eye(4)
+    pose[2, 3] = 0.05
+    tool = RangeSensor.array("tool", mount="tcp", pose=pose)
+    others = [RangeSensor.array(f"far {i}", pose=eye(3.0 + i, 3.0, 0.0)) for i in range(9)]
+    loop = run(spots="off", range_sensors=[tool, *others], ranging=RangeRules(unseen="occupied"))
+    valid = {"free": np.ones(64, bool), "one zone": np.arange(64) == 0, "no zone": np.zeros(64, bool)}.get(first)
+    for k in range(200):
+        images = [sensor.image(np.full(64, np.inf), stamp=k * DT) for sensor in others] if k % 16 == 0 else []
+        if valid is not None and k == 0:
+            images.append(tool.image(np.full(64, np.inf), stamp=0.0, valid=valid))
+        tick = loop.feed(loop.q, loop.qd, images=images, now=k * DT)
+        if k >= 150 or first != "free":  # who saw that all was free knows it for a while
+            assert len(tick.near) > 10, k
+
+
+def eye(*place: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = place
+    return pose
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.6, 2.4])
+def test_who_runs_is_not_forgotten_for_a_look_at_where_a_walker_would_be(run: Any, eyes: Any, speed: float) -> None:
+    """One camera has measured the speed and loses him; another one sees free what a walker can reach, no more."""
+    period, last, begin = 1 / 15, 6, 0.94 + 6 / 15 * speed
+    optics = ((60, 80), (57.0, 57.0, 39.5, 29.5))
+    one, two = (
+        RangeSensor.camera(name, *optics, pose=eyes.looking(at, place), period=period, max_age=0.8, sigma=0.002)
+        for name, place, at in (("one", (0.7, 2.2, 0.9), (0.7, 0.0, 0.7)), ("two", (1.2, -2.5, 1.2), (1.2, 0.0, 0.7)))
+    )
+    left, known = last * period + 0.2, {}
+
+    def across(camera: RangeSensor) -> np.ndarray:
+        """Where each zone's ray meets the plane y = 0 that he runs in [m]."""
+        looks = camera.directions @ camera.pose[:3, :3].T
+        return camera.pose[0, 3] - camera.pose[1, 3] / looks[:, 1] * looks[:, 0]
+
+    for helped in (False, True):
+        loop, k, shown = run(spots="off", range_sensors=[one, two], sensing=BLIND_TO_ITSELF), 0, False
+        for j in range(160):
+            now, images = DT * (j + 1), []
+            if now >= k * period:
+                body = (begin - speed * k * period, 0.0, 0.7, 0.04)
+                seen = eyes.seen(one, one.pose, [body] if k <= last else [])
+                images, k = [one.image(seen, stamp=k * period, valid=across(one) > 0.88)], k + 1
+            if helped and not shown and now >= left + DT:
+                shown = True
+                reach = begin - speed * last * period - 1.6 * 0.2 - 0.08  # where a walker can have got to
+                images.append(two.image(np.full(4800, np.inf), stamp=left, valid=across(two) > reach))
+            tick = loop.feed(loop.q, loop.qd, images=images, now=now)
+            if abs(now - left - 3 * DT) < 1e-9:
+                known[helped] = len(tick.near)
+    assert known[False] > 0
+    assert (known[True] > 0) == (speed > 1.6)

@@ -132,3 +132,15 @@ def test_mistakes_are_named() -> None:
     for option in ({"order": "mirror"}, {"along": "z"}, {"valid": (5, 255)}):
         with pytest.raises(ConfigurationError, match=next(iter(option))):
             Vl53l5cx(EIGHT, **option)
+
+
+@pytest.mark.parametrize(
+    "sigma", [np.full(63, 150), np.full(128, 150), "150", ["150"] * 64, [None] * 64, 150, np.ma.masked_all(64)]
+)
+def test_sigmas_that_are_none_make_a_frame_tell_nothing(sigma) -> None:
+    """They may have been large: the sensor's own in their place would be too sure."""
+    adapter = Vl53l5cx(EIGHT)
+    frame = {"distance_mm": np.full(64, 1000), "target_status": np.full(64, 5), "stamp": 0.0}
+    assert np.asarray(adapter.image(**frame).valid).all()
+    assert np.asarray(adapter.image(**frame, range_sigma_mm=np.full(64, 150)).valid).all()
+    assert not np.asarray(adapter.image(**frame, range_sigma_mm=sigma).valid).any()

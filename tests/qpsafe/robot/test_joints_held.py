@@ -196,3 +196,26 @@ def test_a_denavit_hartenberg_table_with_a_joint_that_slides() -> None:
     np.testing.assert_allclose(
         frames, dh_frames(table + np.array([[0, 0, 0, 0], [0, 0.7, 0, 0]]), np.array([0.5, 0.0]))
     )
+
+
+NO_NUMBERS = ["0.1", "", None, True, [0.1], {}, 1j, np.nan, np.inf, -np.inf, np.array([0.1])]
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+def test_what_is_held_at_no_number_is_named(value: object, tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError) as caught:
+        load(tmp_path, None, hold={"latch": value})
+    assert caught.value.key == "hold.latch"
+    assert "finite number" in caught.value.expected
+
+
+@pytest.mark.parametrize("hold", ["latch", "", ["latch"], [], [("latch", 0.1)], 0.1, 0, True, False], ids=repr)
+def test_what_is_no_mapping_holds_nothing(hold: object, tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError) as caught:
+        load(tmp_path, None, hold=hold)
+    assert (caught.value.key, caught.value.value) == ("hold", hold)
+
+
+@pytest.mark.parametrize("value", [0, 0.1, np.float64(0.1), np.float32(0.1), np.int64(1)], ids=repr)
+def test_any_real_number_holds_a_joint(value: float, tmp_path: Path) -> None:
+    assert load(tmp_path, None, hold={"latch": value}).held["latch"].value == pytest.approx(float(value))

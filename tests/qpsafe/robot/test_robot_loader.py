@@ -190,3 +190,67 @@ def test_collision_bodies_of_a_urdf_with_a_held_joint_are_found(tmp_path: Path) 
     ((body, _, corners),) = body_hulls(load_robot(path, hold={"shoulder": 0.7}))
     assert body == 1
     np.testing.assert_allclose(np.abs(corners), 0.05, atol=1e-12)
+
+
+MESH = '<link name="fore"><collision><geometry><mesh filename="{}"/></geometry></collision>'
+
+
+def obj(path: Path, size: float) -> None:
+    """A tetrahedron with edges of this length along the axes."""
+    corners = "".join(f"v {x} {y} {z}\n" for x, y, z in np.vstack((np.zeros(3), size * np.eye(3))))
+    path.write_text(corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize("given", ["arm/planar.urdf", "arm", "arm/robot.toml", "arm/../arm/planar.urdf"])
+def test_a_robot_keeps_to_its_files_wherever_the_program_goes(
+    given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is read later is what was found at first; another folder has files of the same names."""
+    from qpsafe.robot.robot_file.starting_file import starting_robot_toml
+
+    for name, size in (("here", 0.1), ("there", 0.5)):
+        folder = tmp_path / name / "arm"
+        folder.mkdir(parents=True)
+        path = urdf(folder)
+        path.write_text(path.read_text("utf-8").replace('<link name="fore">', MESH.format("part.obj")), "utf-8")
+        obj(folder / "part.obj", size)
+        obj(tmp_path / name / "part.obj", 3.0 * size)
+        (folder / "spots.toml").touch()
+        text = starting_robot_toml(load_robot(path), folder, spots="spots.toml")
+        (folder / "robot.toml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "here")
+    robot = load_robot(given)
+    other = robot.with_spots("arm/spots.toml")
+    described = load_robot("arm/planar.urdf", "arm/robot.toml")
+    monkeypatch.chdir(tmp_path / "there")
+    for one in (robot, described):
+        ((_, _, points),) = one.hulls()
+        np.testing.assert_allclose(np.ptp(points, axis=0), 0.1, rtol=1e-6)
+    own = tmp_path / "here" / "arm"
+    for path in (robot.folder, robot.model_path.parent, described.folder, other.spots_path.parent):
+        assert path.is_absolute()
+        assert path.samefile(own)
+
+
+@pytest.mark.parametrize("name", ["irb140", IRB140.folder, IRB140.folder / "robot.toml"])
+@pytest.mark.parametrize("toml", ["/nowhere.toml", IRB140.folder / "robot.toml"])
+def test_a_robot_that_has_a_robot_toml_takes_no_other_one(name: str | Path, toml: str | Path) -> None:
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(name, toml)
+    assert (caught.value.key, caught.value.value) == ("toml", str(toml))
+
+
+def test_a_sensor_file_that_is_named_and_missing_is_an_error_but_for_the_usual_name(tmp_path: Path) -> None:
+    from qpsafe.robot.robot_file.starting_file import starting_robot_toml
+
+    bare = load_robot(urdf(tmp_path))
+    for name in ("spot.toml", "spots-tof.toml", "sensors/spots.toml", "x" * 300):
+        text = starting_robot_toml(bare, tmp_path, spots=name)
+        (tmp_path / "robot.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(RobotFileError) as caught:
+            load_robot(tmp_path)
+        assert (caught.value.where, caught.value.key) == (str(tmp_path / "robot.toml"), "spots")
+        assert caught.value.value == name
+    text = starting_robot_toml(bare, tmp_path, spots="spots.toml")
+    (tmp_path / "robot.toml").write_text(text, encoding="utf-8")
+    assert load_robot(tmp_path).spots_path is None

@@ -2,11 +2,15 @@
 
 import json
 import math
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import qpsafe
+from qpsafe.errors import ConfigurationError
 from qpsafe.sim.experiments.fixed.experiment import FixedExperiment
 from qpsafe.sim.experiments.fixed.fixed_loop import FixedLoop
 from qpsafe.sim.people.choreography import Approach, Choreography
@@ -83,3 +87,37 @@ def test_the_first_experiment_keeps_its_promises_with_sharp_sensors():
         report = summarise(log, experiment.board_distance_without_controller(), experiment.windows(), ROBOT)
         assert report.kept, [check for check in report.checks if not check.kept]
         assert set(log.status) == {"ok"}
+
+
+@pytest.mark.parametrize(("count", "expected"), [(1, []), (2, [2])])
+def test_there_are_never_more_processes_than_moments(count, expected, monkeypatch):
+    asked = []
+
+    class Forked(Exception):
+        pass
+
+    def pool(jobs, **_):
+        asked.append(jobs)
+        raise Forked
+
+    monkeypatch.setattr("multiprocessing.get_context", lambda kind: SimpleNamespace(Pool=pool))
+    monkeypatch.setattr("qpsafe.sim.sick.matrix.at_moment", lambda *task: [])
+    experiment = FixedExperiment(ROBOT, choreography=BRIEF, duration=5.0)
+    with pytest.raises(Forked) if expected else nullcontext():
+        run_matrix(experiment, count=count, seed=4, cases=(), jobs=10**20)
+    assert asked == expected
+
+
+def test_where_no_sensor_can_fall_sick_nothing_is_run():
+    with pytest.raises(ConfigurationError, match=r"run_matrix: sensor = 'perfect'.*sensors that can fall sick"):
+        run_matrix(FixedExperiment(ROBOT, sensor="perfect", choreography=BRIEF), count=1, jobs=1)
+
+
+@pytest.mark.parametrize("sensor", ["perfect", "foo", "", "perfect+depth"])
+def test_the_command_refuses_other_sensors_before_it_begins(sensor, monkeypatch):
+    from qpsafe.cli.main import app
+
+    monkeypatch.setattr("qpsafe.cli.sensors.sick_sensors.progress_bar", lambda screen: pytest.fail("it has begun"))
+    result = CliRunner().invoke(app, ["sick-sensors", "--sensor", sensor])
+    assert isinstance(result.exception, ConfigurationError)
+    assert str(result.exception).startswith(f"qpsafe sick-sensors: --sensor = {sensor!r}")

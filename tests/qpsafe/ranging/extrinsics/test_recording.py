@@ -174,3 +174,11 @@ def test_a_recording_with_broken_bytes_is_named_or_read(tmp_path: Path, robot: A
         path.write_bytes(bytes(broken[: int(rng.integers(1, len(whole) + 1))] if rng.random() < 0.3 else broken))
         with suppress(ConfigurationError):
             load_recording(path, SENSOR, robot)
+
+
+def test_images_of_a_folder_have_one_scale(tmp_path: Path, robot: Any) -> None:
+    for k in range(6):
+        scale = 0.001 if k < 5 else 0.0001
+        np.savez(tmp_path / f"{k}.npz", q=np.zeros(6), depth=np.full((6, 8), round(1 / scale), np.uint16), scale=scale)
+    with pytest.raises(ConfigurationError, match="scale"):
+        load_recording(tmp_path, SENSOR, robot)
