@@ -163,6 +163,7 @@ class SafetyController(Running):
         """
         start, clocks = time.perf_counter(), self._enter()
         try:
+            self._at_work = True
             tick = self._plan(q, qd, distances, points, ages, images, now)
         except BaseException as error:
             self._recovery.clocks = clocks  # the path waits for a robot that cannot go along
@@ -205,11 +206,10 @@ class SafetyController(Running):
 
         # activations (19), (21) and references, suspended and recovered (IV-C), by CLIK
         switches, activations, regime = self._switching(cdf_n)
-        commanded = RobotState(self._robot, self._q)
+        commanded, stall = RobotState(self._robot, self._q), self._stall
         old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
         gate, people, leads = self.verifies, seen.people, seen.leads
         most = gate.hold(self._q, self._qd, people, old, leads) if gate is not None and len(people) else None
-        stall = self._stall
         if self._seq % stall.every == 0 or stall.held:
             capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
             explained = seen.capped or not min(activations) >= 1.0 or capped or most is not None

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.kinds import flag, of_kind
 from qpsafe.irc5.messages import RobotPacket
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
 from qpsafe.irc5.supervisor import State, StopCategory, Supervisor
-from qpsafe.text.given import number, whole
+from qpsafe.text.given import flag, number, of_kind, whole
 from qpsafe.tick import BAD_INPUT, FAULT, Tick
 
 if TYPE_CHECKING:

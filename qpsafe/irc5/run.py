@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from qpsafe.irc5.distances import SensorInput
-from qpsafe.irc5.kinds import of_kind, to_call
 from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.process.latency import Latency
 from qpsafe.irc5.process.realtime import resident
@@ -17,7 +16,7 @@ from qpsafe.irc5.process.requests import Requests
 from qpsafe.irc5.process.watchdog import Watchdog
 from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.supervisor import State, StopCategory
-from qpsafe.text.given import number
+from qpsafe.text.given import number, of_kind, to_call
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]

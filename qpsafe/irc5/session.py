@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.cycle import Cycle, Phase
-from qpsafe.irc5.kinds import of_kind
 from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
@@ -19,7 +18,7 @@ from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.irc5.transport.inbox import Arrival, Inbox, Sender
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
-from qpsafe.text.given import parts
+from qpsafe.text.given import of_kind, parts
 from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]

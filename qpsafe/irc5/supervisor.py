@@ -16,8 +16,7 @@ from collections.abc import Callable
 from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
-from qpsafe.irc5.kinds import to_call
-from qpsafe.text.given import whole
+from qpsafe.text.given import to_call, whole
 
 
 class State(StrEnum):

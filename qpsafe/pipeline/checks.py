@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numba import types
@@ -146,6 +147,27 @@ def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float) -> E
         raise ConfigurationError("SafetyController", "evasion", evasion, expected)
     if evasion.dt != dt:
         raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
+    return evasion
+
+
+_users: WeakKeyDictionary[Evasion, ref[Any]] = WeakKeyDictionary()  # who remembers motion in which evasion
+
+
+def own_evasion(user: Any, evasion: Evasion) -> Evasion:
+    """`evasion`, if nobody else remembers motion in it: one would be moved by what the other one sees.
+
+    Args:
+        user: Whose `evasion` it becomes.
+        evasion: That fits the user.
+
+    Raises:
+        ConfigurationError: It is the `evasion` of another user, who is still there.
+    """
+    other = _users.get(evasion, lambda: None)()
+    if other is not None and other is not user and getattr(other, "evasion", None) is evasion:
+        expected = f"one of its own: another {type(other).__name__} has it"
+        raise ConfigurationError(type(user).__name__, "evasion", evasion, expected)
+    _users[evasion] = ref(user)
     return evasion
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
-from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.danger.activation import Activation
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.separation_limit import SeparationLevel, SeparationLimit, oldest
-from qpsafe.errors import ConfigurationError
 from qpsafe.gate.pack import surroundings
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.geometry.clearance import ClearanceLimit, checked_clearance
@@ -32,6 +30,7 @@ from qpsafe.pipeline.checks import (
     checked_gate,
     checked_law,
     checked_separation,
+    own_evasion,
 )
 from qpsafe.pipeline.sensors import Sensors
 from qpsafe.recovery.recovery import Recovery, RecoveryRules
@@ -46,9 +45,6 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
     from qpsafe.robot.state import RobotState
     from qpsafe.tasks.task import Task
-
-
-_users: WeakKeyDictionary[Evasion, ref[Parts]] = WeakKeyDictionary()  # who remembers its motion in which evasion
 
 
 class Parts(Sensors):
@@ -133,13 +129,7 @@ class Parts(Sensors):
 
     @evasion.setter
     def evasion(self, evasion: Evasion | str | None) -> None:
-        found = checked_evasion(evasion, self._robot, self._dt)
-        other = _users.get(found, lambda: None)()
-        if other not in (None, self) and other._evasion is found:  # one would be moved by what the other one sees
-            raise ConfigurationError(
-                "SafetyController", "evasion", evasion, "one of its own: another controller has it"
-            )
-        self._evasion, _users[found] = found, ref(self)
+        self._evasion = own_evasion(self, checked_evasion(evasion, self._robot, self._dt))
 
     @property
     def limits(self) -> JointLimits | Literal["off"]:

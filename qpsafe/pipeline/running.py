@@ -35,8 +35,11 @@ class Running(Parts):
         """
         if self._at_work:
             raise QpsafeError("a tick is being made: `step` was called by one of its own parts, or by another thread")
-        self._at_work = True
         return self._recovery.clocks
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy is in no tick, also one that a part of the controller makes within a tick."""
+        return {**self.__dict__, "_at_work": False}
 
     def _switching(self, cdf_n: float) -> Switching:
         """Switches (19), (21), activations and regime; of a class of the user's, checked.

@@ -14,7 +14,7 @@ from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits, checked_limits
-from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot
+from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot, own_evasion
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.sensing.detection import (
@@ -82,7 +82,7 @@ class DangerMonitor:
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
         if not isinstance(self.activation, Activation):
             raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
-        self.evasion = checked_evasion(evasion, robot, self.dt)
+        self.evasion = own_evasion(self, checked_evasion(evasion, robot, self.dt))
         self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
         self._base = None if base is None else checked_pose("DangerMonitor", "base", base)
         self.reset()

@@ -181,12 +181,13 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         order = names if table.joints is None else table.joints
         chains.append(DHChain(rows, tuple(table.frames), tuple(names.index(name) for name in order)))
     danger = file.danger
-    spots = None if file.spots is None else path.parent / file.spots
+    spots, notes = None if file.spots is None else path.parent / file.spots, model_file.notes
     if spots is not None and not os.path.isfile(spots):
         if file.spots != _SPOTS:
             expected = f"a file in the same folder; only {_SPOTS} may be missing as yet"
             raise RobotFileError(path, "spots", file.spots, expected)
         spots = None
+        notes = (*notes, f"{_SPOTS}, which {path.name} names, is not there: no sensors on the robot's skin")
     regions = tuple(
         Region(
             r.name,
@@ -207,7 +208,7 @@ def _to_spec(path: Path, file: RobotFile, model_path: Path, model_file: ModelFil
         manufacturer=file.manufacturer,
         folder=path.parent,
         model_path=model_path,
-        notes=model_file.notes,
+        notes=notes,
         spots_path=spots,
         joint_names=tuple(names),
         lower=si * np.array([joint.lower for joint in joints]),

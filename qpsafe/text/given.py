@@ -1,4 +1,4 @@
-"""What a person gives as numbers, checked when a part is made: what is none is an error that names the argument."""
+"""What a person gives, checked when a part is made: what is not of its kind is an error that names the argument."""
 
 from __future__ import annotations
 
@@ -123,3 +123,50 @@ def one_of(where: str, key: str, value: Any, known: tuple[str, ...]) -> str:
     if not (isinstance(value, str) and value in known):
         raise ConfigurationError(where, key, value, f"one of {known}")
     return value
+
+
+def flag(where: str, key: str, value: Any) -> bool:
+    """`value`, if it is True or False: text such as "no" would count as true.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        value: As given.
+
+    Raises:
+        ConfigurationError: It is neither.
+    """
+    if not isinstance(value, bool):
+        raise ConfigurationError(where, key, value, "True or False")
+    return value
+
+
+def of_kind(where: str, key: str, value: Any, kind: type) -> None:
+    """Refuse what is no object of a class.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        value: As given.
+        kind: The class.
+
+    Raises:
+        ConfigurationError: It is something else.
+    """
+    if not isinstance(value, kind):
+        raise ConfigurationError(where, key, value, f"an object of the class {kind.__name__}")
+
+
+def to_call(where: str, key: str, value: Any) -> None:
+    """Refuse what cannot be called.
+
+    Args:
+        where: Who asks, for the error.
+        key: Its name, for the error.
+        value: As given.
+
+    Raises:
+        ConfigurationError: It cannot.
+    """
+    if not callable(value):
+        raise ConfigurationError(where, key, value, "a function, or another object that can be called")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.errors import ConfigurationError, RobotFileError, RobotWarning
 from qpsafe.robot.loader import load_robot
 
 GOOD = load_robot("irb140")
@@ -162,6 +162,7 @@ def test_joint_order_in_the_file_does_not_matter(folder: Path) -> None:
 
 
 def test_spots_are_optional(folder: Path) -> None:
-    assert load_robot(write(folder)).spots_path is None
+    with pytest.warns(RobotWarning, match=r"spots\.toml.*not there: no sensors"):
+        assert load_robot(write(folder)).spots_path is None
     (folder / "spots.toml").touch()
     assert load_robot(write(folder)).spots_path == folder / "spots.toml"

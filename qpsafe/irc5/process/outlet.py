@@ -14,8 +14,7 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
-from qpsafe.irc5.kinds import of_kind, to_call
-from qpsafe.text.given import number
+from qpsafe.text.given import number, of_kind, to_call
 
 #: More bytes than this never wait.
 MOST = 1 << 22

@@ -14,11 +14,10 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from qpsafe.errors import ConfigurationError, QpsafeError
-from qpsafe.irc5.kinds import flag, of_kind
 from qpsafe.irc5.process.outlet import Outlet
 from qpsafe.irc5.records.formats import BinaryFormat, CsvFormat, ReferenceFormat
 from qpsafe.reference import JointReference
-from qpsafe.text.given import whole
+from qpsafe.text.given import flag, of_kind, whole
 
 #: Records between two flushes to the operating system: a second of references.
 FLUSH_EVERY = 250

@@ -110,9 +110,7 @@ class LaserScanner:
         if not (hasattr(scan, "angle_min") and hasattr(scan, "angle_increment")):
             return True
         try:
-            rays = np.arange(
-                len(self.sensor)
-            )  # all of them: a whole turn the other way round begins, ends and halves alike
+            rays = np.arange(len(self.sensor))  # all: a full circle the other way round begins and halves alike
             angles = float(scan.angle_min) + float(scan.angle_increment) * rays
         except (TypeError, ValueError, OverflowError):
             return False

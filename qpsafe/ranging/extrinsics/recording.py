@@ -69,7 +69,7 @@ def load_recording(path: str | Path, sensor: RangeSensor, robot: Robot) -> Recor
                         raise ValueError
                     stacked[key] = stacked[key][0]
             except (KeyError, ValueError):
-                raise ConfigurationError(path, key, "not the same in all files", "one shape") from None
+                raise ConfigurationError(path, key, "not the same in all files", "one shape, and one scale") from None
         table = stacked
     else:
         table = tables[0]

@@ -17,6 +17,7 @@ import qpsafe
 from qpsafe.danger.activation import Switching
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.gate.rules import VerifiedMotion
+from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.sensing.units import UnitWatch
 
 N, THRESHOLDS = 6, robot_thresholds(qpsafe.load_robot("irb140"))
@@ -145,6 +146,11 @@ def test_what_remembers_is_of_one_controller_alone(irb140: Any) -> None:
         made(irb140, evasion=evasion)
     with pytest.raises(qpsafe.ConfigurationError, match="evasion"):
         second.evasion = evasion
+    with pytest.raises(qpsafe.ConfigurationError, match="evasion"):
+        DangerMonitor(irb140, 0.004, evasion=evasion)
+    monitor = DangerMonitor(irb140, 0.004, evasion=qpsafe.Evasion(2.0, 10.0, N))
+    with pytest.raises(qpsafe.ConfigurationError, match="evasion"):
+        second.evasion = monitor.evasion
     first.evasion = evasion  # its own
     for one in (copy.deepcopy(first), copy.copy(first), pickle.loads(pickle.dumps(first))):
         one.step(irb140.home, np.zeros(N), points=[])
@@ -154,3 +160,20 @@ def test_what_remembers_is_of_one_controller_alone(irb140: Any) -> None:
     gc.collect()
     third = made(irb140, evasion=evasion)
     assert third.evasion is evasion
+
+
+class Copies(Calls):
+    """Copies the controller that it works for within a tick."""
+
+    def solve(self, problem: Any) -> Any:
+        self.state["copies"] = [copy.deepcopy(self.state["controller"]), copy.copy(self.state["controller"])]
+        return qpsafe.HierarchicalLaw.solve(self, problem)
+
+
+def test_a_copy_made_within_a_tick_can_make_ticks(irb140: Any) -> None:
+    law = Copies(set())
+    controller = made(irb140, law)
+    law.state["controller"] = controller
+    controller.step(irb140.home, np.zeros(N), points=[])
+    for one in law.state["copies"]:
+        assert one.step(irb140.home, np.zeros(N), points=[]).status == "ok"

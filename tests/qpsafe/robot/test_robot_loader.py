@@ -160,7 +160,7 @@ def test_a_toml_elsewhere_describes_a_model_file(tmp_path: Path) -> None:
     for name in ("lower", "upper", "max_velocity", "max_acceleration", "home", "dh"):
         np.testing.assert_array_equal(getattr(robot, name), getattr(IRB140, name))
     assert robot.wire_frames == IRB140.wire_frames
-    assert robot.notes == ()
+    assert [note[:41] for note in robot.notes] == ["spots.toml, which mine.toml names, is not"]
     with pytest.raises(RobotFileError, match="max_velocity"):
         load_robot(IRB140.model_path, path, max_velocity=1.0)
 
