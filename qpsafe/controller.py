@@ -31,7 +31,7 @@ from qpsafe.pipeline.checks import (
     checked_recovery,
     checked_robot,
 )
-from qpsafe.pipeline.resolve import Resolved, judged
+from qpsafe.pipeline.resolved import Resolved, judged
 from qpsafe.pipeline.running import Running
 from qpsafe.pipeline.stages import Stages
 from qpsafe.recovery.recovery import RECOVERING, RecoveryRules

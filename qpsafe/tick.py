@@ -12,7 +12,7 @@ from qpsafe.gate.gated import PASSED, Gated
 from qpsafe.geometry.clearance_level import ClearanceLevel
 from qpsafe.laws.problem import LawResult
 from qpsafe.limits import Box
-from qpsafe.pipeline.resolve import Resolved
+from qpsafe.pipeline.resolved import Resolved
 from qpsafe.reference import JointReference, same
 from qpsafe.tasks.errors import TaskErrors
 from qpsafe.text.words import counted

@@ -14,7 +14,7 @@ from qpsafe.batch.reference_kernel import event_time, measure, sample_all
 from qpsafe.compiled import by_reference as reference_module
 from qpsafe.compiled.compiled import Array, inline, linked
 from qpsafe.compiled.memory import view
-from qpsafe.danger import activation, push
+from qpsafe.danger import activation
 from qpsafe.danger.activation import multiply_compiled, switch_compiled
 from qpsafe.danger.evasion import filter_by
 from qpsafe.geometry import clearance_kernel
@@ -38,6 +38,7 @@ from qpsafe.pipeline.sense_kernel import (
     sense_points,
     sense_readings,
 )
+from qpsafe.ranging.ranged import COLUMNS
 from qpsafe.recovery import return_kernel, stall, steps
 from qpsafe.recovery.steps import RECOVERING
 from qpsafe.robot import kinematics
@@ -47,8 +48,8 @@ from qpsafe.sensing.speed_cap import fastest
 from qpsafe.tasks import clik, offset
 from qpsafe.tasks.joint import TURN
 
-_sense_readings = linked(sense_readings, kinematics, push, readings, *push.USES, *readings.USES)
-_sense_points = linked(sense_points, kinematics, push, detection, *push.USES)
+_sense_readings = linked(sense_readings, *sense_kernel.USES, readings, *readings.USES)
+_sense_points = linked(sense_points, *sense_kernel.USES, detection)
 _resolve_tick = linked(resolve_tick, *resolve_kernel.USES)
 _clearance_rows = linked(clearance_rows, *clearance_kernel.USES)
 _filter_by = linked(filter_by)
@@ -59,8 +60,8 @@ _parts, _given = inline(parts), inline(given)
 USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
     limits_module, braking, resolve_kernel, sense_kernel, stall, steps, return_kernel, kinematics, speed_cap, units,
-    clik, offset, detection, readings, push, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
-    regimes, law_kernel, *law_kernel.USES, *push.USES, *readings.USES, *MODULES,
+    clik, offset, detection, readings, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
+    regimes, law_kernel, *law_kernel.USES, *sense_kernel.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 
 
@@ -98,10 +99,10 @@ def sense(
     if too_many or (how == code.DISTANCES and not distances.shape[0] == ages.shape[0] == spots_count):
         return code.WRONG_SIZE
     s.marks[code.CAPPED] = 0
-    nobody, nowhere = view(w.points, 0, (0, 3)), view(w.links, 0, (0,))  # a batch takes no images
+    nobody, nowhere = view(w.points, 0, (0, COLUMNS)), view(w.links, 0, (0,))  # a batch takes no images
     if how == code.DISTANCES:
         count, dying, out, cdf_n = _sense_readings(
-            q, qd, distances, ages, nobody, nowhere, nobody, f, i, s.counts, s.seen, spots[0], s.held, s.age, s.track,
+            q, qd, distances, ages, nobody, nowhere, f, i, s.counts, s.seen, spots[0], s.held, s.age, s.track,
             s.evasive, w.sensing, w.points, w.links, w.danger, w.vectors, s.qd0,
         )  # fmt: skip
         if count < 0:
@@ -115,7 +116,7 @@ def sense(
     else:
         given_points = points.shape[0]
         count, cdf_n = _sense_points(
-            q, qd, points, nobody, nowhere, nobody, f, i, s.evasive, w.sensing, view(w.points, 0, (given_points, 3)),
+            q, qd, points, nobody, nowhere, f, i, s.evasive, w.sensing, view(w.points, 0, (given_points, 3)),
             view(w.links, 0, (given_points,)), view(w.danger, 0, (given_points,)),
             view(w.vectors, 0, (given_points, 3)), s.qd0,
         )  # fmt: skip

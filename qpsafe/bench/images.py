@@ -64,11 +64,12 @@ def dense() -> Callable[[int], Any]:
     depth = np.where(down > 0.0, 0.95 / np.maximum(down, 1e-3), np.inf)
     depth[100:420, 250:330] = 1.5
     images = [depth + rng.normal(0.0, 0.005, depth.shape) for _ in range(8)]
-    rest, count = np.zeros(6), [0]
+    where = state.q, state.body_poses(), state.wire(np.zeros(6))
+    count = [0]
 
     def reduce(k: int) -> None:
         count[0] += 1
         now = count[0] / 30.0
-        sensing.update([camera.image(images[k % 8], stamp=now)], now, state, field, rest)
+        sensing.update([camera.image(images[k % 8], stamp=now)], now, *where, field)
 
     return reduce

@@ -91,9 +91,22 @@ class DangerField:
         v0 = rows(v0, "wire.start_velocities", len(r0))
         v1 = rows(v1, "wire.end_velocities", len(r0))
         value, gradient = np.empty(len(p)), np.empty((len(p), 3))
-        weights = (self.static, self.kinetic, self.gamma)
-        danger_field(p, moving, r0, r1, v0, v1, weights, self.floor, value, gradient)
+        self.fill(p, moving, Wire(r0, r1, v0, v1), value, gradient)
         return value, gradient
+
+    def fill(self, points: NDArray[np.float64], moving: NDArray[np.float64], wire: Wire, value: NDArray[np.float64],
+             gradient: NDArray[np.float64]) -> None:  # fmt: skip
+        """`evaluate` of arrays that are known to fit, into others.
+
+        Args:
+            points: (p, 3) [m].
+            moving: Their velocities (p, 3) [m/s], or (0, 3) at rest.
+            wire: The robot's links.
+            value: Filled with CDF (p,), eq. (5).
+            gradient: Filled with its gradient (p, 3) [1/m].
+        """
+        weights = (self.static, self.kinetic, self.gamma)
+        danger_field(points, moving, *wire, weights, self.floor, value, gradient)
 
     def value(self, points: ArrayLike, wire: Wire, point_velocities: ArrayLike | None = None) -> NDArray[np.float64]:
         """CDF (p,), eq. (5); arguments as for `evaluate`.

@@ -8,7 +8,6 @@ its stage; the others stay the compiled ones.
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import accumulate, pairwise
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -18,13 +17,13 @@ from numpy.typing import NDArray
 
 from qpsafe.hqp.own.regimes import MOST_LAYOUTS, MOST_SOFT, layout_for
 from qpsafe.hqp.solution import SOLVED
-from qpsafe.laws.explained import Solved, explain
 from qpsafe.laws.hierarchical import weigh
 from qpsafe.laws.kinds import NULLSPACE, OTHER, PAPER, STRICT, WEIGHTED, kind_of, numbers_of
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
-from qpsafe.limits import Box, JointLimits
+from qpsafe.limits import JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
+from qpsafe.pipeline.resolved import Resolved
 from qpsafe.recovery.returning import Led
 from qpsafe.sensing.detection import reals
 from qpsafe.tasks.task import PoseTask
@@ -41,64 +40,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _FLOAT = np.dtype(np.float64)
-
-
-class Resolved:
-    """What is to be done in a tick; explained, from numbers that stay, when it is looked at.
-
-    Args:
-        command: Joint velocity (n,) [rad/s], inside the box.
-        excess: By how much the law's answer was outside; NaN if a limit gave way.
-        solved: Whether the law answered as planned.
-        box: Admissible velocities, if they are known already.
-        result: The law's answer, likewise.
-        frozen: Else they are made from the results of `resolve_tick`, the evasive velocity, the regimes' weights, the
-            rows of each task, the time it took [s], kind, weights and activations of the law for `explain`, whether
-            there are limits, and the soft levels.
-    """
-
-    def __init__(
-        self, command: Array, excess: float, solved: bool, box: Box | None = None, result: LawResult | None = None,
-        frozen: tuple[Any, ...] | None = None,
-    ) -> None:  # fmt: skip
-        self.command, self.excess, self.solved = command, excess, solved
-        self._box, self._result, self._frozen = box, result, frozen
-
-    @cached_property
-    def _parts(self) -> Parts:
-        assert self._frozen is not None
-        floats, integers, _, weights, counts, *_ = self._frozen
-        return Parts(*parts(floats, integers, len(self.command), sum(counts), len(weights)))
-
-    @cached_property
-    def box(self) -> Box | None:
-        """Admissible velocities; None without limits."""
-        if self._frozen is None or not self._frozen[-2]:
-            return self._box
-        return Box(*self._parts.bounds, *self._parts.codes)
-
-    @cached_property
-    def result(self) -> LawResult | None:
-        """The law's answer; None if it was not asked."""
-        if self._result is not None or self._frozen is None:
-            return self._result
-        cut, (_, _, qd0, weights, counts, taken, how, _, soft) = self._parts, self._frozen
-        solved = Solved(
-            cut.A, cut.b, qd0, cut.bounds[0], cut.bounds[1], cut.blend, cut.x, cut.info, weights, counts, taken, soft
-        )  # fmt: skip
-        return explain(solved, self.solved, *how)
-
-    @property
-    def soft(self) -> tuple[Level, ...]:
-        """Levels under the joint limits, before the first task."""
-        return () if self._frozen is None else self._frozen[-1]
-
-    @cached_property
-    def errors(self) -> tuple[Array, ...]:
-        """Of the tasks against their references of this tick, (rows,) each."""
-        if self._frozen is None:
-            return ()
-        return tuple([self._parts.e[first:last] for first, last in pairwise([0, *accumulate(self._frozen[4])])])
 
 
 class Resolve:
@@ -121,7 +62,8 @@ class Resolve:
         self._robot, self._dt = robot, dt
         #: Rows of each task that the compiled call fills in, None for the others.
         self._rows = [task.rows if isinstance(task, PoseTask) and task.plain else None for task in tasks]
-        self._counts = tuple([len(rows) for rows in self._rows if rows is not None])
+        self._counts = tuple([0 if rows is None else len(rows) for rows in self._rows])
+        self._others = [k for k, rows in enumerate(self._rows) if rows is None]
         self._kind = kind_of(law, len(tasks))
         *damping, importance = numbers_of(law, len(tasks)) if self._kind != OTHER else (0.0, 0.0, ())
         self._numbers = (*damping, np.array(importance))
@@ -217,12 +159,16 @@ class Resolve:
     def _take(self, state: RobotState, samples: Sequence[Any]) -> tuple[tuple[int, ...], dict[int, Clik]]:
         """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
         asked: dict[int, Clik] = {}
-        if type(samples) is Led and not samples.asked and None not in self._rows:  # at once
+        left: Sequence[int] = range(len(self._rows))
+        if type(samples) is Led:  # what is led on a pose at once
             self._goals[:], self._twists[:], self._standing[:] = samples.goals, samples.twists, 0.0
-            return self._counts, asked
-        counts = []
-        for k, (task, rows, sample) in enumerate(zip(self.parts[0], self._rows, samples, strict=True)):
-            if rows is not None:
+            left = sorted({*samples.asked, *self._others}) if samples.asked else self._others
+            if not left:
+                return self._counts, asked
+        counts = list(self._counts)
+        for k in left:
+            task, sample = self.parts[0][k], samples[k]
+            if self._rows[k] is not None:
                 pose, twist = sample.pose, sample.twist
                 if (
                     type(pose) is type(twist) is np.ndarray
@@ -231,11 +177,10 @@ class Resolve:
                     and twist.shape == (6,)
                 ):
                     self._goals[k], self._twists[k], self._standing[k] = pose, twist, 0.0
-                    counts.append(len(rows))
                     continue
             self._standing[k] = 1.0
             asked[k] = task.clik(state, sample)
-            counts.append(len(asked[k].velocity))
+            counts[k] = len(asked[k].velocity)
         return tuple(counts), asked
 
     def _laid_out(self, counts: tuple[int, ...], room: int) -> tuple[Any, ...]:
@@ -283,17 +228,3 @@ class Resolve:
 
 _NO_LIMITS = np.empty((0, 0))
 _ROOM = 16  # memory is made for soft rows by so many
-
-
-def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
-    """What was unusual, in words: limits that gave way, a law that exceeded them, a solver that did not finish."""
-    box, result = resolved.box, resolved.result
-    assert result is not None
-    messages: tuple[str, ...] = ()
-    if box is not None and not resolved.excess <= 1e-9:
-        messages = box.notes(names)
-        lists = result.qd.tolist(), box.lower.tolist(), box.upper.tolist()
-        beyond = [name for name, v, lo, hi in zip(names, *lists, strict=True) if lo - v > 1e-9 or v - hi > 1e-9]
-        if beyond:
-            messages = (*messages, "the law exceeded the limits, clipped: " + ", ".join(beyond))
-    return messages if resolved.solved else (*messages, f"law: {result.status}")

@@ -19,8 +19,15 @@ from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
 from qpsafe.gate.gated import NO_AGES
-from qpsafe.pipeline.sense_kernel import pack, sense_points, sense_readings, work_size
-from qpsafe.ranging.ranged import PERSON, Ranged
+from qpsafe.pipeline.sense_kernel import (
+    bodies_and_wire,
+    pack,
+    sense_points,
+    sense_readings,
+    stand,
+    work_size,
+)
+from qpsafe.ranging.ranged import COLUMNS, PERSON, Ranged
 from qpsafe.robot.wire import Wire
 from qpsafe.sensing.detection import (
     BadInput,
@@ -113,6 +120,7 @@ class Sense:
         self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
         self.blocks = pack(self._sizes, given, given)
         self._work = np.empty(work_size(self._sizes, counts[0] + self._more))
+        self._stood = bodies_and_wire(self._sizes, self._work)
 
     def __call__(
         self, q: ArrayLike, qd: ArrayLike, distances: ArrayLike | None, points: ArrayLike | None,
@@ -134,9 +142,9 @@ class Sense:
             refuse(q, qd, self._robot)
         more = _NO_MORE
         if self._ranging is not None:
-            state = self._robot.at(as_joint_position(q, self._robot))
-            as_joint_velocity(qd, self._robot)
-            more = self._ranging.update((), now, state, self.parts[1], qd, person)
+            if not stand(q, qd, *self.blocks, self._work):
+                refuse(q, qd, self._robot)
+            more = self._ranging.update((), now, q, *self._stood, self.parts[1], person)
             if distances is None and points is None and self.parts[0] is None:
                 points = _NOBODY
         elif images is not None:
@@ -161,7 +169,7 @@ class Sense:
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0 = np.empty(len(q))
         count, dead, out, cdf_n = sense_readings(
-            q, qd, distances, sensing.as_ages(ages), *more[:3], *self.blocks, *sensing.memory, self._before, self._work,
+            q, qd, distances, sensing.as_ages(ages), *more[:2], *self.blocks, *sensing.memory, self._before, self._work,
             points, links, danger, vectors, qd0,
         )  # fmt: skip
         if count < 0:
@@ -169,11 +177,12 @@ class Sense:
         severity, too_many, notes = sensing.take(dead, out)
         if too_many:
             raise BadInput("; ".join(notes))
-        seen = Seen(
-            points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, severity != CLEAR
-        )
+        capped = severity != CLEAR
         if self._ranging is not None:
-            seen = self._with(seen, more, readings=True)
+            capped, notes = self._with(capped, notes, more, sensing.unseen)
+        seen = Seen(
+            points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, capped, *more[2:4]
+        )
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
@@ -186,15 +195,16 @@ class Sense:
         points, links, danger, vectors = np.empty((p, 3)), np.empty(p, np.int64), np.empty(p), np.empty((p, 3))
         qd0, work = np.empty(len(q)), np.empty(work_size(self._sizes, p))
         count, cdf_n = sense_points(
-            q, qd, given, *more[:3], *self.blocks, self._before, work, points, links, danger, vectors, qd0
+            q, qd, given, *more[:2], *self.blocks, self._before, work, points, links, danger, vectors, qd0
         )  # fmt: skip
         if count == -1:
             refuse(q, qd, self._robot)
         if count < 0:
             refuse_points(points)
-        seen = Seen(points, links, danger, vectors, cdf_n, qd0, notes)
+        capped = False
         if self._ranging is not None:
-            seen = self._with(seen, more)
+            capped, notes = self._with(capped, notes, more)
+        seen = Seen(points, links, danger, vectors, cdf_n, qd0, notes, capped, *more[2:4])
         return self._ended(seen, work, p if len(more.points) else 0)
 
     def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
@@ -206,20 +216,28 @@ class Sense:
         kept = reduced(given, wire)
         return kept, (f"{counted(len(given), 'point')} are reduced to those nearest to the links, {len(kept)}",)
 
-    def _with(self, seen: Seen, more: Ranged, readings: bool = False) -> Seen:
-        """The same with what images tell beside their points.
+    def _with(
+        self, capped: bool, notes: tuple[str, ...], more: Ranged, spots: tuple[str, ...] = ()
+    ) -> tuple[bool, tuple[str, ...]]:
+        """Whether the robot has to go slowly, and what is wrong, with what images tell beside their points.
+
+        Args:
+            capped: By the spots alone.
+            notes: Likewise.
+            more: Of the images.
+            spots: That do not see, if their readings are given.
 
         Raises:
-            BadInput: With the spots, if their readings are given, too many sensors do not see.
+            BadInput: With the spots too many sensors do not see.
         """
         assert self._ranging is not None
-        spots = self.parts[0].unseen if readings and self.parts[0] is not None else ()
-        out = len(spots) + len(self._ranging.unseen) if spots else 0  # either kind alone has been counted
-        if out > self._ranging.most:
-            notes = "; ".join((*seen.notes, *more.notes))
-            raise BadInput(f"more than {self._ranging.most} of all sensors do not see: stopped until they do; {notes}")
-        capped = seen.capped or self._ranging.severity != CLEAR
-        return seen._replace(notes=(*seen.notes, *more.notes), capped=capped, near=more.near, leads=more.leads)
+        notes = (*notes, *more.notes) if more.notes else notes
+        watches = self._ranging.watches
+        out = len(spots) + len(watches.unseen) if spots else 0  # either kind alone has been counted
+        if out > watches.most:
+            more_than = f"more than {watches.most} of all sensors do not see: stopped until they do"
+            raise BadInput("; ".join((more_than, *notes)))
+        return capped or watches.severity != CLEAR, notes
 
     @property
     def _before(self) -> Array:
@@ -258,5 +276,5 @@ class Sense:
         return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)
 
 
-_NO_MORE = Ranged(_NOBODY, _NOWHERE, _NOBODY, _NOBODY, NO_AGES)
+_NO_MORE = Ranged(np.empty((0, COLUMNS)), _NOWHERE, _NOBODY, NO_AGES)
 _NOT_FINITE = "the danger of a detected point is not finite: joint values or points are out of all bounds"

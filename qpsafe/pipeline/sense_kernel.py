@@ -20,19 +20,23 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
 from qpsafe.compiled.memory import view
-from qpsafe.danger import push
+from qpsafe.danger import link_field, push, speed
 from qpsafe.danger.evasion import filter_by
-from qpsafe.danger.push import push_by
+from qpsafe.danger.link_field import danger_field
+from qpsafe.danger.push import push_vectors
+from qpsafe.ranging import ranged
+from qpsafe.ranging.ranged import DANGER, GRADIENT, PLACE, VELOCITY
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, forward, wire_of
+from qpsafe.robot.wire import Wire
 from qpsafe.sensing import detection, readings
 from qpsafe.sensing.detection import find_nearest
 from qpsafe.sensing.readings import take_readings
 
 # each is compiled once, for Python and for these calls
 _forward, _wire_of, _filter_by = linked(forward), linked(wire_of), linked(filter_by)
-_take_readings, _push_by = linked(take_readings, *readings.USES), linked(push_by, *push.USES)
-_find_nearest = linked(find_nearest, compiled)
+_take_readings, _push_vectors = linked(take_readings, *readings.USES), linked(push_vectors, *push.USES)
+_find_nearest, _danger_field = linked(find_nearest, compiled), linked(danger_field, speed)
 
 # the block of integers begins with sizes, then tells where each field of the two blocks begins
 JOINTS, ENDS, LINKS, SPOTS, HULLS, FACES, MEMORY = range(7)
@@ -87,8 +91,19 @@ def place_bodies(q: Array, f: Array, i: Index, memory: Array) -> None:
     )  # fmt: skip
 
 
-@inline
-def _stand(q: Array, qd: Array, f: Array, i: Index, work: Array) -> bool:
+def bodies_and_wire(sizes: tuple[int, ...], work: Array) -> tuple[Array, Wire]:
+    """Poses of the robot's bodies (n + 1, 4, 4), and its wire, in the memory that the calls work in."""
+    n, m, memory = sizes[JOINTS], sizes[LINKS], sizes[MEMORY]
+    wire = work[memory : memory + 12 * m].reshape(4, m, 3)
+    return work[: 16 * (n + 1)].reshape(n + 1, 4, 4), Wire(*wire)
+
+
+_any, _block, _out = readable(1), types.Array(types.float64, 1, "C", readonly=True), types.float64[::1]
+_ints_block = types.Array(types.int64, 1, "C", readonly=True)
+
+
+@entry(types.boolean(_any, _any, _block, _ints_block, _out), kinematics)
+def stand(q: Array, qd: Array, f: Array, i: Index, work: Array) -> bool:
     """Kinematics and wire of a measurement; False, and nothing done, if it is none."""
     n, k, m = i[JOINTS], i[ENDS], i[LINKS]
     if not is_measurement(q, qd, f, i):
@@ -103,24 +118,37 @@ def _stand(q: Array, qd: Array, f: Array, i: Index, work: Array) -> bool:
     return True
 
 
+_stand = linked(stand, kinematics)
+
+
 @inline
 def _evade(
-    f: Array, i: Index, work: Array, moving: int, points: Array, links: Index, values: Array, vectors: Array,
-    before: Array, qd0: Array,
+    f: Array, i: Index, work: Array, moving: int, more: Array, points: Array, links: Index, values: Array,
+    vectors: Array, before: Array, qd0: Array,
 ) -> float:  # fmt: skip
-    """Danger, torque and q̇0 of the points; CDF_n, NaN if anything is not finite, or if the field is not ours."""
+    """Danger, torque and q̇0 of the points; CDF_n, NaN if anything is not finite, or if the field is not ours.
+
+    The danger of the last points, `more`, is known already; as many of the others as `moving` says move.
+    """
     n, m = i[JOINTS], i[LINKS]
     weights = view(f, i[WEIGHTS], (4,))
     if weights[0] != weights[0]:
         return nan
-    a = i[MEMORY] + 12 * m
+    a, own = i[MEMORY] + 12 * m, points.shape[0] - more.shape[0]
     wire, torque = view(work, i[MEMORY], (4, m, 3)), view(work, a, (n,))
-    velocities = view(work, a + n, (moving, 3))
-    # danger (1)-(6) -> virtual torque (8), (14), (15)
-    cdf_n = _push_by(
-        points, velocities, links, wire[0], wire[1], wire[2], wire[3], (weights[0], weights[1], weights[2]), weights[3],
-        view(work, 0, (i[MEMORY],)), i[ENDS], view(i, i[STARTS], (m,)), view(i, i[STOPS], (m,)),
-        values, vectors, torque,
+    # danger (1)-(5) and its gradients
+    _danger_field(
+        view(points, 0, (own, 3)), view(work, a + n, (moving, 3)), wire[0], wire[1], wire[2], wire[3],
+        (weights[0], weights[1], weights[2]), weights[3], view(values, 0, (own,)), view(vectors, 0, (own, 3)),
+    )  # fmt: skip
+    for p in range(more.shape[0]):
+        values[own + p] = more[p, DANGER]
+        for c in range(3):
+            vectors[own + p, c] = more[p, GRADIENT + c]
+    # -> virtual torque (6), (8), (14), (15)
+    cdf_n = _push_vectors(
+        values, links, view(work, 0, (i[MEMORY],)), i[ENDS], view(i, i[STARTS], (m,)), view(i, i[STOPS], (m,)), vectors,
+        torque,
     )  # fmt: skip
     # -> evasive velocity (16)
     _filter_by(view(f, i[A], (n, n)), view(f, i[B], (n, n)), before, torque, qd0)
@@ -131,20 +159,19 @@ def _evade(
 
 
 @inline
-def _append(
-    count: int, more: Array, more_links: Index, more_velocities: Array, points: Array, links: Index, velocities: Array
-) -> int:
+def _append(count: int, more: Array, more_links: Index, points: Array, links: Index, velocities: Array) -> int:
     """Put more points behind the first `count`; returns how many there are then."""
     for p in range(more.shape[0]):
         links[count + p] = more_links[p]
         for c in range(3):
-            points[count + p, c], velocities[count + p, c] = more[p, c], more_velocities[p, c]
+            points[count + p, c], velocities[count + p, c] = more[p, PLACE + c], more[p, VELOCITY + c]
     return count + more.shape[0]
 
 
-_any, _block, _ints = readable(1), types.Array(types.float64, 1, "C", readonly=True), types.int64[::1]
-_out, _outs, _ints_block = types.float64[::1], types.float64[:, ::1], types.Array(types.int64, 1, "C", readonly=True)
-_more = (readable(2), types.Array(types.int64, 1, "A", readonly=True), readable(2))
+#: All the code that goes into both calls, but for the points.
+USES = (kinematics, push, ranged, *push.USES, link_field, speed)
+_ints, _outs = types.int64[::1], types.float64[:, ::1]
+_more = (readable(2), types.Array(types.int64, 1, "A", readonly=True))
 
 
 @entry(
@@ -153,16 +180,16 @@ _more = (readable(2), types.Array(types.int64, 1, "A", readonly=True), readable(
         types.int64[:, ::1], _outs, types.boolean[::1], _outs, _ints, _outs,
         _any, _out, _outs, _ints, _out, _outs, _out,
     ),
-    kinematics, push, readings, *push.USES, *readings.USES,
+    *USES, readings, *readings.USES,
 )  # fmt: skip
 def sense_readings(
-    q: Array, qd: Array, distances: Array, ages: Array, more: Array, more_links: Index, more_velocities: Array,
-    f: Array, i: Index, counts: Index, seen: Array, dead: Array, held: Array, age: Index, track: Array,
+    q: Array, qd: Array, distances: Array, ages: Array, more: Array, more_links: Index, f: Array, i: Index,
+    counts: Index, seen: Array, dead: Array, held: Array, age: Index, track: Array,
     before: Array, work: Array, points: Array, links: Index, values: Array, vectors: Array, qd0: Array,
 ) -> tuple[int, int, int, float]:  # fmt: skip
     """Fill points, links, values, vectors and qd0 from the readings of k spots; their memory as for `take_readings`.
 
-    More points (e, 3), with links and velocities, count too.
+    More points (e, COLUMNS), see `Ranged`, with their links, count too.
 
     Returns:
         How many points count, -1 if the measurement is none, and then nothing has been touched; how many spots are
@@ -181,10 +208,10 @@ def sense_readings(
         view(f, i[BALLS], (h, 4)), view(f, i[NUMBERS], (i[RAYS] - i[NUMBERS],)), ticks,
         counts, seen, dead, held, age, track, points, links, velocities,
     )  # fmt: skip
-    count = _append(count, more, more_links, more_velocities, points, links, velocities)
     moving = count if ticks[3] else 0  # no velocities: points at rest
+    count = _append(count, more, more_links, points, links, velocities)
     cdf_n = _evade(
-        f, i, work, moving, view(points, 0, (count, 3)), view(links, 0, (count,)), view(values, 0, (count,)),
+        f, i, work, moving, more, view(points, 0, (count, 3)), view(links, 0, (count,)), view(values, 0, (count,)),
         view(vectors, 0, (count, 3)), before, qd0,
     )  # fmt: skip
     return count, dying, out, cdf_n
@@ -194,11 +221,11 @@ def sense_readings(
     types.Tuple((types.int64, types.float64))(
         _any, _any, readable(2), *_more, _block, _ints_block, _any, _out, _outs, _ints, _out, _outs, _out
     ),
-    kinematics, push, detection, *push.USES,
+    *USES, detection,
 )  # fmt: skip
 def sense_points(
-    q: Array, qd: Array, given: Array, more: Array, more_links: Index, more_velocities: Array, f: Array, i: Index,
-    before: Array, work: Array, points: Array, links: Index, values: Array, vectors: Array, qd0: Array,
+    q: Array, qd: Array, given: Array, more: Array, more_links: Index, f: Array, i: Index, before: Array,
+    work: Array, points: Array, links: Index, values: Array, vectors: Array, qd0: Array,
 ) -> tuple[int, float]:  # fmt: skip
     """Fill points, links (the nearest), values, vectors and qd0 from given points (p, 3) at rest, and more that move.
 
@@ -214,13 +241,12 @@ def sense_points(
             points[p, c] = given[p, c]
     if not _find_nearest(view(points, 0, (count, 3)), wire[0], wire[1], view(links, 0, (count,))):
         return -2, nan
-    moving = 0
     if total > count:
         for p in range(count):
             for c in range(3):
                 velocities[p, c] = 0.0
-        moving = _append(count, more, more_links, more_velocities, points, links, velocities)
-    return total, _evade(f, i, work, moving, points, links, values, vectors, before, qd0)
+        _append(count, more, more_links, points, links, velocities)
+    return total, _evade(f, i, work, 0, more, points, links, values, vectors, before, qd0)
 
 
 Blocks = tuple[NDArray[np.float64], NDArray[np.int64]]

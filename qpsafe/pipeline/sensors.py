@@ -110,8 +110,8 @@ class Sensors:
         if self._sensing is not None:
             severity, names = self._sensing.health.severity, self._sensing.unseen
         if self._ranging is not None:
-            severity = max(severity, self._ranging.severity, key=(CLEAR, CAPPED, STOPPED).index)
-            names = (*names, *self._ranging.unseen)
+            severity = max(severity, self._ranging.watches.severity, key=(CLEAR, CAPPED, STOPPED).index)
+            names = (*names, *self._ranging.watches.unseen)
         return severity, tuple(dict.fromkeys((*names, *self._units.odd))) if self._units.odd else names
 
     def _receive(self, images: Any) -> None:

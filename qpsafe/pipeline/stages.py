@@ -11,7 +11,8 @@ import numpy as np
 from qpsafe.danger.link_parts import LinkParts
 from qpsafe.laws.barrier import DangerBarrier
 from qpsafe.pipeline.checks import check_command
-from qpsafe.pipeline.resolve import Array, Resolve, Resolved
+from qpsafe.pipeline.resolve import Array, Resolve
+from qpsafe.pipeline.resolved import Resolved
 from qpsafe.pipeline.sense import Seen, Sense
 from qpsafe.sensing.body import body_hulls
 

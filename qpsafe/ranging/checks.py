@@ -43,6 +43,8 @@ def as_time(name: str, value: Any) -> float:
     Raises:
         BadInput: It is no number, or not finite.
     """
+    if type(value) is float and isfinite(value):
+        return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import inf
+from operator import itemgetter
 from typing import Any
 
 from qpsafe.ranging.checks import as_time
@@ -40,7 +41,7 @@ class Inbox:
         """
         if isinstance(images, RangeImage):
             images = (images,)
-        if not isinstance(images, Iterable):
+        if not (type(images) is list or isinstance(images, Iterable)):
             self._notes.append(f"images are no list of RangeImages but {type(images).__name__}")
             return
         for image in images:
@@ -49,8 +50,9 @@ class Inbox:
                 self._notes.append(who)
             else:
                 self._waiting.append((_when(image), who, image))
-        self._waiting.sort(key=lambda one: one[:2])
-        self._leave_out(MOST)
+        if len(self._waiting) > 1:
+            self._waiting.sort(key=itemgetter(0, 1))
+            self._leave_out(MOST)
 
     def take(self) -> tuple[list[tuple[int, RangeImage]], list[str]]:
         """Images to be taken now with the numbers of their sensors; what is wrong, in words."""

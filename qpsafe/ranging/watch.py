@@ -100,7 +100,7 @@ class SensorWatch:
     def _is_frozen(self, stamp: float, distances: Array, shown: Shown, where: Array) -> bool:
         same = shown.hits > 0 and same_numbers(distances, self._last)
         if not same:
-            self._last, self._where, self._since, self._same = distances.copy(), where, stamp, 0
+            self._last, self._where, self._since, self._same = distances.copy(), where.copy(), stamp, 0
             return False
         self._same += 1
         if self._same < 2 or stamp - self._since < self._sensing.stuck_after:

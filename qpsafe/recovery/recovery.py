@@ -106,7 +106,7 @@ class Recovery:
         self.path_time, self._passed, self._cursors, self._due = time, passed, cursors, None
         self.tasks, self.suspend_above, self._way = tuple(tasks), suspend_above, None
         self._returns = Returns(self.tasks, self._rules, self._dt)
-        self._alike = all(map(answers_alike, self.tasks))
+        self._asked = [k for k, task in enumerate(self.tasks) if not answers_alike(task)]  # for their errors, at once
         if self.phase != FOLLOWING:
             self._returns.begin()
         self._last: tuple[Any, Any] | None = None  # state and references of suspended tasks, last tick
@@ -208,9 +208,11 @@ class Recovery:
             state: Commanded configuration of this tick.
             references: What `update` returned.
         """
-        if type(references) is Led and not references.asked and self._alike:
-            return TaskErrors(self.tasks, state, references.wanted, {})
-        return TaskErrors.against(self._sampled() if self._samples is None else self._samples, self.tasks, state)
+        samples = self._sampled() if self._samples is None else self._samples
+        if type(references) is not Led or references.asked:
+            return TaskErrors.against(samples, self.tasks, state)
+        asked = {k: np.array(self.tasks[k].error(self.tasks[k].value(state), samples[k])) for k in self._asked}
+        return TaskErrors(self.tasks, state, references.wanted, asked)
 
     def due_events(self) -> tuple[str, ...]:
         """Names of the events that the path has come to, in their order; until `pass_events` they are due again."""

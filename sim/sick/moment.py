@@ -57,7 +57,7 @@ def at_moment(loop: FixedLoop, before: Array, cases: Sequence[Case | FrameCase],
         ticks = _play(copy, sick, before, case)
         controller = copy.controller
         controller.acknowledge()
-        parts = [part.severity for part in (controller.ranging,) if part is not None]
+        parts = [] if controller.ranging is None else [controller.ranging.watches.severity]
         parts += [] if controller.sensing is None else [controller.sensing.health.severity]
         after = next((severity for severity in ("stopped", "capped") if severity in parts), "clear")
         window = Window(sick, loop.sensor_names, before, healthy, ticks, after, controller.rules, controller.dt)

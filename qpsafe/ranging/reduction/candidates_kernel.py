@@ -12,6 +12,8 @@ from math import inf, isfinite, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, add, dot, entry, readable, row
+from qpsafe.ranging import ranged
+from qpsafe.ranging.ranged import DANGER, GRADIENT
 from qpsafe.ranging.reduction import nearest_kernel
 from qpsafe.ranging.reduction.nearest_kernel import to_link
 from qpsafe.ranging.tracking import prediction
@@ -147,13 +149,14 @@ def place_all(
 
 @entry(
     types.int64(
-        _two, _whole, _two, _whole, _any, types.int64, types.float64, _whole, types.int64[:, :, ::1], _outs, _whole,
-        _outs,
-    )
+        _two, _whole, _two, _whole, _any, _two, types.int64, types.float64, _whole, types.int64[:, :, ::1], _outs,
+        _whole,
+    ),
+    ranged,
 )  # fmt: skip
 def choose(
-    points: Array, links: Index, velocities: Array, sensors: Index, danger: Array, most: int, apart: float,
-    marks: Index, used: Index, chosen: Array, chosen_links: Index, chosen_velocities: Array,
+    points: Array, links: Index, velocities: Array, sensors: Index, danger: Array, gradient: Array, most: int,
+    apart: float, marks: Index, used: Index, chosen: Array, chosen_links: Index,
 ) -> int:  # fmt: skip
     """Choose the points that count in eq. (8): of each link and sensor the most dangerous ones, and nothing twice.
 
@@ -161,12 +164,13 @@ def choose(
     nothing.
 
     Args:
-        points, links, velocities, sensors, danger: Of p points, see `place_all`.
+        points, links, velocities, sensors: Of p points, see `place_all`.
+        danger, gradient: CDF there (p,), and its gradient (p, 3).
         most: How many of each link and sensor.
         apart: Points of one link that are as near to each other as that are one thing [m].
         marks: To work in (p,).
         used: To work in (2, s, links): how often a sensor was heard for a link, and by which choice last.
-        chosen, chosen_links, chosen_velocities: Filled, in falling order of danger (p, 3), (p,), (p, 3).
+        chosen, chosen_links: Filled, in falling order of danger (p, COLUMNS), see `Ranged`, (p,).
 
     Returns:
         How many were chosen; -1 if a danger is not finite: it would never be the largest.
@@ -185,9 +189,10 @@ def choose(
         if best < 0:
             return total
         link, b = links[best], row(points, best)
-        chosen_links[total] = link
+        chosen_links[total], chosen[total, DANGER] = link, danger[best]
         for c in range(3):
-            chosen[total, c], chosen_velocities[total, c] = points[best, c], velocities[best, c]
+            chosen[total, ranged.PLACE + c], chosen[total, ranged.VELOCITY + c] = points[best, c], velocities[best, c]
+            chosen[total, GRADIENT + c] = gradient[best, c]
         total += 1
         for i in range(count):
             w = add(row(points, i), -1.0, b)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.reduction.looking_kernel import AROUND
 from qpsafe.ranging.reduction.reduce_kernel import SHOWN, farthest_zone, reduce_zones, tile, tile_sigma
+from qpsafe.ranging.tracking.velocities import MOST
 
 if TYPE_CHECKING:
     from qpsafe.ranging.judge import Usable
@@ -35,6 +36,7 @@ class Shown(NamedTuple):
         through: Of these, that see through what is there.
         impossible: That read less than nothing.
         seen: Whose points count.
+        sparse: Of how many points there is a choice, see `Reducer.sparse`.
     """
 
     valid: int
@@ -45,6 +47,7 @@ class Shown(NamedTuple):
     through: int
     impossible: int
     seen: int
+    sparse: int
 
 
 def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
@@ -109,6 +112,7 @@ class Reducer:
         distances, valid, sigma: Of the zones of the last image (z,).
         found: All points of the last image that count, as many as it was told to show (z, 4).
         kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
+        sparse: Places of the points that the last image left, then of others that count, evenly chosen [m].
     """
 
     def __init__(
@@ -132,18 +136,8 @@ class Reducer:
         self._tiles = np.empty(count), np.empty(count, dtype=np.bool_)
         self.distances, self.valid, self.sigma = np.empty(count), np.zeros(count, dtype=np.bool_), np.empty(count)
         self.kept = np.empty((links * rules.each, 4))
+        self.sparse = np.empty((max(MOST, len(self.kept) + 1), 3))
         self._shown = np.zeros(SHOWN, dtype=np.int64)
-
-    def around(self, count: int, seen: int, most: int) -> Array:
-        """The points that the last image left, then others that count, evenly chosen, `most` in all (p, 3) [m].
-
-        Args:
-            count: How many points `kept` holds.
-            seen: How many points count.
-            most: p at most, or `count` if that is more.
-        """
-        every = -(-seen // max(most - count, 1)) if seen else 1
-        return np.concatenate((self.kept[:count, :3], self.found[:seen:every, :3]))
 
     def __call__(self, image: Usable, pose: Array, then: Array, wire: Wire, carrier: int) -> tuple[int, Shown]:
         """Reduce an image: how many points `kept` holds now, and what the image shows.
@@ -169,6 +163,6 @@ class Reducer:
         count = reduce_zones(
             distances, sigma, valid, self.zones.directions, self._slants, pose, self._numbers,
             wire.starts, wire.ends, then, *self._tables, *self._work, carrier, self._each, self._stride, self.kept,
-            self._shown,
+            self.sparse, self._shown,
         )  # fmt: skip
         return count, Shown(*self._shown.tolist())

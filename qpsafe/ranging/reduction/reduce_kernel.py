@@ -32,8 +32,8 @@ from qpsafe.sensing import hulls
 from qpsafe.sensing.hulls import within
 
 #: What an image shows, see `Told` in `qpsafe.ranging.reduction.reduce`.
-VALID, HITS, OWN, KNOWN, EXPECTED, THROUGH, IMPOSSIBLE, SEEN = range(8)
-SHOWN = 8
+VALID, HITS, OWN, KNOWN, EXPECTED, THROUGH, IMPOSSIBLE, SEEN, SPARSE = range(9)
+SHOWN = 9
 
 _ints = types.Array(types.int64, 1, "C", readonly=True)
 _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (2, 3))
@@ -44,7 +44,7 @@ _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1
     types.int64(
         readable(1), readable(1), types.Array(types.boolean, 1, "A", readonly=True), _two, readable(1), _two,
         readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole, _outs, types.int64[:, ::1],
-        types.int64, types.int64, types.int64, _outs, _whole,
+        types.int64, types.int64, types.int64, _outs, _outs, _whole,
     ),
     hulls, looking_kernel, nearest_kernel,
 )  # fmt: skip
@@ -72,6 +72,7 @@ def reduce_zones(
     each: int,
     stride: int,
     kept: Array,
+    sparse: Array,
     shown: Index,
 ) -> int:
     """Keep the points of an image that matter, (c, 4): place in the world [m], how wrong it may be [m].
@@ -92,6 +93,8 @@ def reduce_zones(
         each: How many points a link keeps.
         stride: Of so many zones one is asked whether it sees through what is known.
         kept: Filled, at least links · each rows.
+        sparse: Filled with the places of what is kept, then of others that count, evenly chosen (s, 3); `shown[SPARSE]`
+            tells how many these are; s is above links · each.
         shown: Filled with counts of zones (`SHOWN`,).
 
     Returns:
@@ -142,7 +145,17 @@ def reduce_zones(
         zones[n] = 0
         n += 1
     shown[SEEN] = n
-    return keep_nearest(found, n, away, zones, each, numbers[SPREAD], kept)
+    c = keep_nearest(found, n, away, zones, each, numbers[SPREAD], kept)
+    room = sparse.shape[0] - c
+    every, count = (n + room - 1) // room, c  # of so many points that count one
+    for i in range(c):
+        sparse[i, 0], sparse[i, 1], sparse[i, 2] = kept[i, 0], kept[i, 1], kept[i, 2]
+    for i in range(n):
+        if i % every == 0:
+            sparse[count, 0], sparse[count, 1], sparse[count, 2] = found[i, 0], found[i, 1], found[i, 2]
+            count += 1
+    shown[SPARSE] = count
+    return c
 
 
 @entry(

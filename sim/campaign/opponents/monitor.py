@@ -77,7 +77,8 @@ class Monitor:
             seen = found.points
         if self._ranging is not None and images is not None:
             try:
-                seen = np.concatenate((seen, self._ranging.update(images, now, state, self._field, qd).near))
+                where = q, state.body_poses(), state.wire(qd)
+                seen = np.concatenate((seen, self._ranging.update(images, now, *where, self._field).near))
             except BadInput:
                 return None
         self.seen = seen

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import qpsafe
 from qpsafe.laws.problem import LawProblem, TaskVelocity
 from qpsafe.pipeline.checks import checked_velocity
-from qpsafe.pipeline.resolve import Resolve, Resolved, judged
+from qpsafe.pipeline.resolve import Resolve
+from qpsafe.pipeline.resolved import Resolved, judged
 from qpsafe.tasks.task import Task
 from qpsafe.tasks.trajectory import Sample
 
