@@ -232,15 +232,15 @@ class SafetyController(Running):
         else:
             resolved = self._stages.resolve_under(barrier, as_joint_position(q, self._robot), seen, resolve, given)
         command = resolved.command if separation is None else kept_apart(soft, resolved.command, resolved.box)
-        messages = () if resolved.excess <= 1e-9 and resolved.solved else judged(resolved, self._robot.joint_names)
         if seen.capped:  # a sector is unseen
             command = slowed(command, commanded, self._rules.speed_cap, resolved.box)
         if stall.held:
             command = slower(self._braking, self._qd)
         gated, doubts = PASSED, _SILENT
         if gate is not None:
-            command, doubts = command.copy(), gate.notes()
+            command, doubts = command.copy(), self._stages.doubts(gate)
             gated = gate(self._q, self._qd, command, people, old, leads, len(people) > 0)
+        messages = () if resolved.fine(limits) else judged(resolved, self._robot.joint_names, command)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
         return Tick(
             reference=self._reference(command),
@@ -269,7 +269,7 @@ class SafetyController(Running):
 
     def _brake(self, status: str, message: str) -> Tick:
         """Brake towards standstill within the limits and hold."""
-        braked = brake(self._braking, self._evasion, self._q, self._qd)
+        braked = brake(self._braking, self._evasion, (self._q, self._qd, self._acceleration), self._robot)
         return Tick(
             reference=self._reference(braked.command),
             cdf_n=float("nan"),

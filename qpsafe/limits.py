@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.compiled.compiled import entry, inline, readable
 from qpsafe.errors import ConfigurationError
 from qpsafe.fixed import Fixed
+from qpsafe.robot.own_limits import check_slides
 from qpsafe.text.given import number, numbers
 from qpsafe.text.words import call
 
@@ -29,6 +30,7 @@ SHORTEST_TICK = 1e-6
 LEAST, MOST = 1e-100, 1e100
 #: Kinds of limits by their code; 0 stands for none.
 KINDS = ("", "position", "velocity", "acceleration", "jerk", "stillness")
+JERK = KINDS.index("jerk")
 
 
 class Box(NamedTuple):
@@ -180,7 +182,7 @@ def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, d
         dt: Tick [s].
 
     Raises:
-        ConfigurationError: They do not fit; the error names `where`.
+        ConfigurationError: They do not fit, or let a joint slide too far; the error names `where`.
     """
     if limits is None or (isinstance(limits, str) and limits == "robot"):
         return JointLimits.of(robot, dt)
@@ -192,6 +194,7 @@ def checked_limits(where: str, limits: JointLimits | str | None, robot: Robot, d
         raise ConfigurationError(where, "limits", f"limits of shape {limits.lower.shape}", f"({robot.nq},)")
     if limits.dt != dt:
         raise ConfigurationError(where, "limits.dt", limits.dt, f"the controller's tick, dt = {dt} s")
+    check_slides(where, limits, robot)
     return limits
 
 

@@ -156,7 +156,7 @@ def work(floats: Any, integers: Any, at: Any, sizes: Any, room: int) -> Work:
         view(integers, at[38], (sizes[15],)),
         view(integers, at[39], (3,)),
         view(floats, at[40], (sizes[20] + (sizes[21] + 1) * room,)),
-        view(integers, at[41], (sizes[21] * room + 2,)),
+        view(integers, at[41], (sizes[21] * room + 3,)),
     )
 
 

@@ -96,7 +96,7 @@ def _plan(
             seen, ages, leads, 1, s.gated,
         )  # fmt: skip
         if s.gated[SHORT] > WORTH_SAYING:
-            notes |= code.TOO_NEAR
+            notes |= code.TOO_LONG if s.gated[SHORT] == inf else code.TOO_NEAR
     watch_units(p, s, spots[1], distances, points, how == code.POINTS)
     if how == code.DISTANCES and (s.marks[code.OUT] > 0 or s.marks[code.STOPPED] == 1):
         notes |= code.SENSORS_SICK

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from qpsafe.batch import code
 from qpsafe.batch.blocks import Own
-from qpsafe.gate.gated import TOO_NEAR
+from qpsafe.gate.gated import TOO_LONG, TOO_NEAR
 from qpsafe.recovery.stall import TEXTS
 from qpsafe.sensing.health import HEALTHY, WORDS
 
@@ -29,6 +29,7 @@ _NOTES = {
     code.LAW_EXCEEDED: "the law exceeded the limits, clipped",
     code.NOT_SOLVED: "law: not solved as planned",
     code.TOO_NEAR: TOO_NEAR,
+    code.TOO_LONG: TOO_LONG,
     code.ODD_UNITS: "readings or points too far away to be metres; +inf where nothing is in sight",
 }
 

@@ -14,6 +14,7 @@ from qpsafe.gate.gated import NO_AGES, PASSED, Gated
 from qpsafe.gate.pack import bare_links, pack, robot_capsules, surroundings
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.gate.stillness_kernel import hold_still
+from qpsafe.robot.own_limits import beyond_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,7 +53,6 @@ class Gate(Fixed):
         self._looked: list[Array] = []  # what the last call of `hold` measured
         self.blocks = pack(robot, (rules, limits, max_age), self.solids, self.groups)
         self._known = np.full(len(self.groups) * (1 + robot.nq), np.nan)  # nothing has been measured
-        self._unsaid = True
 
     def __call__(
         self, q: Array, qd: Array, command: Array, points: Array, ages: Array, leads: Array = NO_AGES,
@@ -100,15 +100,12 @@ class Gate(Fixed):
         return most if hold_still(*self.blocks, *self._work, q, qd, points, ages, leads, most) else None
 
     def notes(self) -> tuple[str, ...]:
-        """Doubts about the geometry that it measures with, in words; reported once."""
-        if not self._unsaid:
-            return ()
-        self._unsaid = False
-        bare = bare_links(self.robot).names
+        """Doubts about the geometry that it measures with, in words."""
+        bare, wide = bare_links(self.robot).names, beyond_own(self.limits, self.robot)
         if not bare:
-            return ()
+            return wide
         return (f"the model has no collision geometry here: only a line without thickness is kept from people, along "
-                f"{', '.join(bare)}",)  # fmt: skip
+                f"{', '.join(bare)}", *wide)  # fmt: skip
 
     @property
     def sizes(self) -> tuple[int, int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from qpsafe.gate.gate_kernel import WORTH_SAYING
 
 #: What a tick says where its command is not verified.
 TOO_NEAR = "a link that could touch somebody moves towards them faster than allowed, though it brakes: seen too late"
+TOO_LONG = "braking at these limits takes too long to be looked at within a tick: the robot brakes, not verified"
 
 
 class Gated(NamedTuple):
@@ -22,7 +24,8 @@ class Gated(NamedTuple):
         other: What it came too near to: a known obstacle or a geometry of the robot; empty for a person.
         point: Which seen point, -1 for none.
         short: Where even braking approaches somebody too fast, by how much in all [m]: somebody was seen where, by
-            the figures, nobody could be. Then braking or the command is sent, whichever comes nearer by less.
+            the figures, nobody could be. Then braking or the command is sent, whichever comes nearer by less. Infinite
+            where the way is too long to be looked at in a tick, with limits of minutes of braking: it brakes.
     """
 
     share: float = 1.0
@@ -40,6 +43,8 @@ class Gated(NamedTuple):
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the tick's messages: where braking is short of more than 1 mm."""
+        if self.short == inf:
+            return (TOO_LONG,)
         return (TOO_NEAR,) if self.short > WORTH_SAYING else ()
 
     def __str__(self) -> str:
@@ -47,7 +52,9 @@ class Gated(NamedTuple):
             return "all of the command is verified"
         other = f"point {self.point}" if self.cause == "person" else self.other
         words = f"{100.0 * self.share:.0f} % of the command let through: {self.link} near {other} ({self.cause})"
-        return words if self.verified else f"{words}; braking comes {1e3 * self.short:.1f} mm too near"
+        if self.verified:
+            return words
+        return f"{words}; {TOO_LONG if self.short == inf else f'braking comes {1e3 * self.short:.1f} mm too near'}"
 
 
 PASSED = Gated()

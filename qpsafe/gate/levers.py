@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sensing.detection import SLIDING_EXCESS
+
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
@@ -44,7 +46,8 @@ def levers(robot: Robot, body: int, points: Array) -> Array:
             far = _across(step, angular) + beyond if angular.any() else np.zeros(1)
             reach = float(np.linalg.norm(step)) + beyond
         result[j] = speed + float(far.max())
-        slides = speed * max(abs(float(robot.lower[j])), abs(float(robot.upper[j]))) if speed else 0.0
+        out = max(abs(float(robot.lower[j])), abs(float(robot.upper[j]))) + SLIDING_EXCESS  # where it is believed to be
+        slides = speed * out if speed else 0.0
         beyond, above = reach + slides, j
     return result
 

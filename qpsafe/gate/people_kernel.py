@@ -36,12 +36,20 @@ from qpsafe.robot.kinematics import Index, cut, forward, place
 _forward = linked(forward, kinematics)
 _ROUNDING = 1e-9  # [m/s]
 MOST = 16  # ticks that are looked at together, a power of 2
+LEFT = 2  # place in `Work.worst` of how many instants may still be looked at in this tick
 
 
 @inline
 def stand(t: Any, q: Array, none: Index, nowhere: Array, memory: Array) -> None:
     """Kinematics of the bodies at q."""
     _forward(q, t.parents, t.placements, t.axes, t.supports, none, nowhere, memory)
+
+
+@inline
+def may_look(w: Any) -> bool:
+    """Whether one more instant of a way may be looked at in this tick."""
+    w.worst[LEFT] -= 1
+    return bool(w.worst[LEFT] >= 0)
 
 
 @inline
@@ -164,6 +172,8 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, enough: flo
     count = _hot(t, v, w.ages, w.away, w.hot)
     excess, tick, person = 0.0, 0, t.numbers[PERSON]
     while count > 0:
+        if not may_look(w):
+            return excess + dt  # too long a way for one tick
         time = tick * dt
         at_time(q, v, t.acceleration, dt, time, w.there)
         total = 0.0

@@ -19,7 +19,7 @@ from typing import Any
 from qpsafe.compiled.compiled import Array, inline, linked
 from qpsafe.compiled.memory import view
 from qpsafe.gate.braking_path import at_time, braked, covered
-from qpsafe.gate.people_kernel import stand
+from qpsafe.gate.people_kernel import may_look, stand
 from qpsafe.gate.tables import DT, FARTHEST, MARGIN
 from qpsafe.geometry import pairs as pairs_module
 from qpsafe.geometry.pairs import nearest_pair
@@ -75,6 +75,8 @@ def touched(t: Any, w: Any, known: Array, q: Array, v: Array) -> int:
         d, time = known[g, 0], 0.0
         least = min(margin, d) - _ROUNDING
         while not way < d - least:
+            if not may_look(w):
+                return g  # too long a way for one tick
             fastest, tick = 0.0, time // dt
             for j in range(n):
                 fastest += t.group_levers[g, j] * abs(braked(v[j], t.acceleration[j], dt, tick))

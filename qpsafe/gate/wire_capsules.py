@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from qpsafe.danger.link_parts import LinkParts
 from qpsafe.gate.capsules import Capsules, capsule_around
+from qpsafe.sensing.detection import plausible
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -59,7 +60,9 @@ def _seen(robot: Robot, first: int, last: int, places: Array) -> tuple[Array, Ar
     supports = robot.tree.supports
     between = np.flatnonzero(supports[first] != supports[last])
     count = max(int(_MOST ** (1.0 / max(len(between), 1))), 2)
-    low, high = (np.where(robot.endless, turn, limit) for turn, limit in ((-np.pi, robot.lower), (np.pi, robot.upper)))
+    low, high, _, _ = plausible(robot)  # those that slide: wherever they are believed to be
+    low, high = np.where(robot.sliding, low, robot.lower), np.where(robot.sliding, high, robot.upper)
+    low, high = np.where(robot.endless, -np.pi, low), np.where(robot.endless, np.pi, high)
     starts, stops = [], []
     for values in product(*(np.linspace(low[j], high[j], count) for j in between)):
         q = robot.home.copy()

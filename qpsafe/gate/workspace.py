@@ -26,7 +26,7 @@ class Work(NamedTuple):
     nowhere: Any  # (0, 3)
     hot: Any  # pairs that have to be looked at (c p,)
     none: Any  # (0,)
-    worst: Any  # capsule and point that were approached (2,)
+    worst: Any  # capsule and point that were approached; how much may still be looked at in this tick (3,)
 
 
 def lengths(n: int, c: int, s: int, m: int, p: int) -> tuple[int, int]:
@@ -39,7 +39,7 @@ def lengths(n: int, c: int, s: int, m: int, p: int) -> tuple[int, int]:
         m: Pairs of shapes.
         p: Points, at most.
     """
-    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + c * p + PAIR + 3 * s + m + 8 + p, c * p + 2
+    return 16 * (n + 1) + 6 * n + 6 * c + 5 * n + c * p + PAIR + 3 * s + m + 8 + p, c * p + 3
 
 
 @inline
@@ -65,5 +65,5 @@ def workspace(floats: Any, integers: Any, n: int, c: int, s: int, m: int, p: int
         view(floats, 0, (0, 3)),
         view(integers, 0, (c * p,)),
         view(integers, 0, (0,)),
-        view(integers, c * p, (2,)),
+        view(integers, c * p, (3,)),
     )

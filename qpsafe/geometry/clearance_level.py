@@ -32,10 +32,11 @@ class ClearanceLevel(Level):
     firm = True
 
     def __init__(self, A: Array, upper: Array, gaps: Array, pairs: Index, names: tuple[str, ...]) -> None:
-        # shapes are right: without the checks of `Level`, which take longer than the rows
-        self.A, self.upper, self.weight = A, upper, None
-        self.lower = np.full(len(upper), -np.inf)
-        self.gaps, self._pairs, self._names = gaps, pairs, names
+        # shapes are right: without the checks of `Level`, which take longer than the rows, as does its own setting
+        put = object.__setattr__
+        put(self, "A", A), put(self, "upper", upper), put(self, "weight", None)
+        put(self, "lower", np.full(len(upper), -np.inf))
+        put(self, "gaps", gaps), put(self, "_pairs", pairs), put(self, "_names", names)
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:

@@ -23,6 +23,7 @@ from qpsafe.geometry.pairs import measured, pose_of
 from qpsafe.geometry.separation import WORK, hull_types
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, tree_types
+from qpsafe.sensing.detection import SLIDING_EXCESS
 
 if TYPE_CHECKING:
     from qpsafe.geometry.solids import Solids
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_JOINTS = 2  # between two bodies, of which a range is divided
 BOXES = 10000  # looked at for one pair, before it counts as one that may meet
-BEYOND = 0.05  # so much beyond their limits joints may be [rad, m]
+BEYOND = 0.05  # so much beyond their limits joints that turn may be [rad]
 _DEPTH = 64
 _forward = linked(forward)
 _proved: dict[int, frozenset[tuple[int, int]]] = {}
@@ -65,10 +66,11 @@ def _apart(solids: Solids, robot: Robot, pair: tuple[int, int], margin: float) -
     if len(joints) > MOST_JOINTS:
         return False
     slides = np.asarray(np.abs(tree.axes[:, :3]).any(axis=1))
+    beyond = np.where(slides, SLIDING_EXCESS, BEYOND)
     turns = ~slides & ~(np.isfinite(robot.lower) & np.isfinite(robot.upper))
     low, high = (
-        np.where(turns, -np.pi, robot.lower - BEYOND)[joints],
-        np.where(turns, np.pi, robot.upper + BEYOND)[joints],
+        np.where(turns, -np.pi, robot.lower - beyond)[joints],
+        np.where(turns, np.pi, robot.upper + beyond)[joints],
     )
     if not (np.isfinite(low) & np.isfinite(high)).all():
         return False
@@ -93,7 +95,7 @@ def _lever(solids: Solids, robot: Robot, pair: tuple[int, int], j: int, slides: 
     lever = float(np.linalg.norm(ball[:3]) + ball[3])
     while body != j + 1:
         k = body - 1
-        travel = max(abs(robot.lower[k]), abs(robot.upper[k])) if slides[k] else 0.0
+        travel = max(abs(robot.lower[k]), abs(robot.upper[k])) + SLIDING_EXCESS if slides[k] else 0.0
         lever, body = lever + float(np.linalg.norm(tree.placements[k, :3, 3]) + travel), int(tree.parents[k])
     return lever
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import types
@@ -14,7 +14,11 @@ from qpsafe.errors import in_words
 from qpsafe.gate import braking_path
 from qpsafe.gate.braking_path import slow_down
 from qpsafe.limits import Box, JointLimits
+from qpsafe.pipeline.resolved import given_way
 from qpsafe.sensing.detection import reals
+
+if TYPE_CHECKING:
+    from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -47,18 +51,21 @@ def slower(limits: JointLimits, qd: Array) -> Array:
     return braked
 
 
-def brake(limits: JointLimits, evasion: Evasion, q: Array, qd: Array) -> Braked:
-    """Brake with the largest acceleration; never raises, whatever the evasion is.
+def brake(limits: JointLimits, evasion: Evasion, motion: tuple[Array, Array, Array], robot: Robot) -> Braked:
+    """Brake with the largest acceleration, jerk limits or not; never raises, whatever the evasion is.
 
     Args:
         limits: Plain limits, none of another making.
         evasion: The admittance.
-        q, qd: Commanded position and velocity (n,) [rad, rad/s].
+        motion: Commanded position, velocity, and the acceleration that led to it (n,) [rad, rad/s, rad/s²].
+        robot: Whose joints these are.
     """
+    q, qd, _ = motion
     none = np.zeros(len(q))
     messages: tuple[str, ...] = ()
     try:
         qd0 = reals("the evasion's velocity", evasion.step(none), none.shape).copy()  # no danger is known: it fades
     except Exception as error:  # an evasion of another making
         qd0, messages = none, (in_words(error),)
-    return Braked(slower(limits, qd), limits.box(q, qd), qd0, messages)
+    command, box = slower(limits, qd), limits.box(*motion)
+    return Braked(command, box, qd0, (*messages, *given_way(box, robot.joint_names, command)))

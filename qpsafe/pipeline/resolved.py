@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from qpsafe.laws.explained import Solved, explain
 from qpsafe.laws.problem import LawResult
-from qpsafe.limits import Box
+from qpsafe.limits import JERK, Box, JointLimits
 from qpsafe.pipeline.resolve_kernel import Parts, parts
 
 if TYPE_CHECKING:
@@ -40,6 +40,10 @@ class Resolved:
     ) -> None:  # fmt: skip
         self.command, self.excess, self.solved = command, excess, solved
         self._box, self._result, self._frozen = box, result, frozen
+
+    def fine(self, limits: JointLimits | None) -> bool:
+        """Whether nothing was unusual, whatever of the command is sent within `limits`."""
+        return self.excess <= 1e-9 and self.solved and (limits is None or limits.max_jerk is None)
 
     @cached_property
     def _parts(self) -> Parts:
@@ -78,15 +82,40 @@ class Resolved:
         return tuple([self._parts.e[first:last] for first, last in pairwise([0, *accumulate(self._frozen[4])])])
 
 
-def judged(resolved: Resolved, names: tuple[str, ...]) -> tuple[str, ...]:
-    """What was unusual, in words: limits that gave way, a law that exceeded them, a solver that did not finish."""
-    box, result = resolved.box, resolved.result
-    assert result is not None
-    messages: tuple[str, ...] = ()
+def judged(resolved: Resolved, names: tuple[str, ...], command: Array) -> tuple[str, ...]:
+    """What was unusual, in words: limits that gave way, a law that exceeded them, a solver that did not finish.
+
+    Args:
+        resolved: What was to be done.
+        names: Of the joints.
+        command: What is sent (n,) [rad/s].
+    """
+    box, messages = resolved.box, tuple[str, ...]()
     if box is not None and not resolved.excess <= 1e-9:
+        assert resolved.result is not None
         messages = box.notes(names)
-        lists = result.qd.tolist(), box.lower.tolist(), box.upper.tolist()
+        lists = resolved.result.qd.tolist(), box.lower.tolist(), box.upper.tolist()
         beyond = [name for name, v, lo, hi in zip(names, *lists, strict=True) if lo - v > 1e-9 or v - hi > 1e-9]
         if beyond:
             messages = (*messages, "the law exceeded the limits, clipped: " + ", ".join(beyond))
-    return messages if resolved.solved else (*messages, f"law: {result.status}")
+    if box is not None:
+        messages = tuple(dict.fromkeys((*messages, *given_way(box, names, command))))
+    if not resolved.solved:
+        assert resolved.result is not None
+        messages = (*messages, f"law: {resolved.result.status}")
+    return messages
+
+
+def given_way(box: Box, names: tuple[str, ...], command: Array) -> tuple[str, ...]:
+    """Jerk limits that what is sent (n,) [rad/s] leaves, in words and in the box: braking, all others bind.
+
+    Args:
+        box: Of the tick.
+        names: Of the joints.
+        command: Inside all limits but those (n,) [rad/s].
+    """
+    beyond = (command < box.lower - 1e-9) | (command > box.upper + 1e-9)
+    if not beyond.any():
+        return ()
+    box.sacrificed[beyond & (box.sacrificed == 0)] = JERK
+    return box.notes(names)

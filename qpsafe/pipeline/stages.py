@@ -38,12 +38,15 @@ class Stages:
         known: Known obstacles of the surroundings.
         carried: What tools may carry, by frame.
         max_age: Older readings do not count [s].
+        said: Doubts about the geometry that have been said.
     """
 
     def __init__(
         self, robot: Robot, dt: float, known: Sequence[Obstacle] = (),
-        carried: Mapping[str, Sequence[Obstacle]] | None = None, max_age: float = 0.0,
+        carried: Mapping[str, Sequence[Obstacle]] | None = None, max_age: float = 0.0, said: tuple[str, ...] = (),
     ) -> None:  # fmt: skip
+        self._said = said
+        self._doubted: Gate | None = None
         self._robot, self._dt = robot, dt
         self._surroundings = tuple(known), carried, max_age
         self._gate: Gate | None = None
@@ -52,7 +55,7 @@ class Stages:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy makes its own: what is kept here cuts its memory into views, which copying would tear apart."""
-        return Stages, (self._robot, self._dt, *self._surroundings)
+        return Stages, (self._robot, self._dt, *self._surroundings, self._said)
 
     def sense(
         self, sensing: DistanceSensing | None, field: Any, evasion: Evasion, ranging: RangeSensing | None = None
@@ -97,6 +100,15 @@ class Stages:
 
             made = self._gate = Gate(self._robot, rules, limits, *self._surroundings)
         return made
+
+    def doubts(self, gate: Gate) -> tuple[str, ...]:
+        """Doubts about what a gate measures with, in words; each is said once."""
+        if gate is self._doubted:
+            return ()
+        self._doubted = gate
+        new = tuple([words for words in gate.notes() if words not in self._said])
+        self._said = (*self._said, *new)
+        return new
 
     def resolve_under(
         self, barrier: DangerBarrier, measured: Array, seen: Seen, resolve: Resolve, given: Any

@@ -24,9 +24,9 @@ class BadInput(Exception):
 
 _FLOAT = np.dtype(np.float64)
 
-#: How far outside its limits a measured joint may be [rad], and how many times its largest speed it may have. Beyond
-#: it is no measurement but, say, degrees taken for radians.
-PLAUSIBLE_EXCESS, PLAUSIBLE_SPEED = np.pi, 10.0
+#: How far outside its limits a measured joint may be, one that turns and one that slides [rad, m], and how many times
+#: its largest speed it may have. Beyond it is no measurement but, say, degrees taken for radians.
+PLAUSIBLE_EXCESS, SLIDING_EXCESS, PLAUSIBLE_SPEED = np.pi, 0.1, 10.0
 
 
 def as_joint_position(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
@@ -44,8 +44,8 @@ def as_joint_velocity(value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
 @functools.lru_cache(maxsize=16)
 def plausible(robot: Robot) -> tuple[NDArray[np.float64], ...]:
     """Lowest and highest position, lowest and highest velocity that can be a measurement, (n,) each."""
-    speed = PLAUSIBLE_SPEED * robot.max_velocity
-    return robot.lower - PLAUSIBLE_EXCESS, robot.upper + PLAUSIBLE_EXCESS, -speed, speed
+    speed, beyond = PLAUSIBLE_SPEED * robot.max_velocity, np.where(robot.sliding, SLIDING_EXCESS, PLAUSIBLE_EXCESS)
+    return robot.lower - beyond, robot.upper + beyond, -speed, speed
 
 
 def _as_joint_vector(

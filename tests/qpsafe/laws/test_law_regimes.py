@@ -112,7 +112,8 @@ def compare(robot: Any, one: Resolved, other: Other) -> None:
     assert one.result is not None
     assert one.result.status == other.result.status
     np.testing.assert_allclose(one.command, other.command, rtol=0.0, atol=1e-9)
-    assert judged(one, robot.joint_names) == judged(other, robot.joint_names)  # type: ignore[arg-type]
+    said = [judged(it, robot.joint_names, one.command) for it in (one, other)]  # type: ignore[arg-type]
+    assert said[0] == said[1]
     for (weight, a), (same, b) in zip(one.result.regimes, other.result.regimes, strict=True):
         assert weight == same
         assert (a.status, a.note, a.solver) == (b.status, b.note, b.solver)
