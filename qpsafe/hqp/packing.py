@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.hqp.level import Level, as_levels
+from qpsafe.hqp.level import Level, as_levels, named_level
+from qpsafe.text.given import numbers, parts
 
 Array = NDArray[np.float64]
 
@@ -55,26 +56,27 @@ def pack(
         rows: Hard rows (G, lower, upper), or None.
     """
     if type(levels) is not list:
-        levels = list(levels)
-    hard = None if rows is None else Level(*rows)
+        levels = list(parts("solve_hierarchy", "levels", levels, "a list of Levels and of pairs (A, b)"))
+    hard = None if rows is None else _hard(rows)
     if not levels and hard is None:
         return _without_levels(lower, upper)
     plain, weight = False, None
     if levels and type(levels[0]) is not Level:  # pairs (A, b), perhaps
         try:
             matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]
-            highs = lows
-            if hard is not None:
-                matrices, lows, highs = (hard.A, *matrices), (hard.lower, *lows), (hard.upper, *highs)
-            matrix, low = np.concatenate(matrices), np.concatenate(lows)
-            high = low if hard is None else np.concatenate(highs)
-            counts = list(map(len, matrices))
-            plain = matrix.dtype == low.dtype == _FLOAT and counts == list(map(len, lows))
-            plain = plain and matrix.ndim == 2 and low.ndim == 1
+            arrays = [type(x) is np.ndarray and x.dtype is _FLOAT for x in matrices + lows]
+            if all(arrays):  # concatenated, masks would be lost and truth values be numbers
+                highs = lows
+                if hard is not None:
+                    matrices, lows, highs = (hard.A, *matrices), (hard.lower, *lows), (hard.upper, *highs)
+                matrix, low = np.concatenate(matrices), np.concatenate(lows)
+                high = low if hard is None else np.concatenate(highs)
+                counts = list(map(len, matrices))
+                plain = counts == list(map(len, lows)) and matrix.ndim == 2 and low.ndim == 1
         except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
             pass
     if not plain:
-        matrix, low, high, weight, counts = _stack(as_levels(levels if hard is None else [hard, *levels]))
+        matrix, low, high, weight, counts = _stack(as_levels(levels, hard))
     if not matrix.flags.c_contiguous:
         matrix = np.ascontiguousarray(matrix)
     n = matrix.shape[1]
@@ -101,14 +103,29 @@ def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, list
     weight = None
     if not plain:
         weight = np.concatenate([np.ones(len(x.A)) if x.weight is None else x.weight for x in levels])
-    return np.concatenate(matrices), low, low if equal else np.concatenate(highs), weight, counts
+    matrix, high = np.concatenate(matrices), low if equal else np.concatenate(highs)
+    # arrays whose shape was changed in place? compiled code trusts it
+    if not len(matrix) == len(low) == len(high) == len(low if weight is None else weight):
+        raise ConfigurationError("solve_hierarchy", "levels", levels, "levels as they were made")
+    return matrix, low, high, weight, counts
+
+
+def _hard(rows: Any) -> Level:
+    """The hard rows as a level."""
+    if not (isinstance(rows, tuple | list) and len(rows) == 3):
+        raise ConfigurationError("solve_hierarchy", "rows", rows, "three of them, (G, lower, upper)")
+    return named_level("rows", *rows)
 
 
 def _without_levels(lower: ArrayLike | None, upper: ArrayLike | None) -> Packed:
     """A problem of limits alone."""
-    n = int(np.size(np.asarray(upper if lower is None else lower)))
     if lower is None and upper is None:
         raise ConfigurationError("solve_hierarchy", "levels", [], "at least one level or one limit")
+    key, given = ("upper", upper) if lower is None else ("lower", lower)
+    expected = "numbers [rad/s], one a joint"
+    n = len(numbers("solve_hierarchy", key, given, expected, 1))
+    if n == 0:
+        raise ConfigurationError("solve_hierarchy", key, given, expected)
     box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
     box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
     return Packed(np.empty((0, n)), np.empty(0), np.empty(0), None, [], box_low, box_high, False)
@@ -127,10 +144,10 @@ def unpack(problem: Packed) -> list[Level]:
 
 def _limit(values: ArrayLike, n: int, name: str) -> Array:
     """(n,) limit, copied."""
-    try:
-        limit = np.array(values, _FLOAT)
-    except (TypeError, ValueError):
-        raise ConfigurationError("solve_hierarchy", name, values, f"{n} numbers [rad/s]") from None
+    if type(values) is np.ndarray and values.dtype == _FLOAT:
+        limit = values.copy()
+    else:
+        limit = numbers("solve_hierarchy", name, values, f"{n} numbers [rad/s]")
     if limit.shape != (n,):
         raise ConfigurationError("solve_hierarchy", f"{name}.shape", limit.shape, f"({n},)")
     return limit

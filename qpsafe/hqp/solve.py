@@ -24,11 +24,11 @@ from qpsafe.hqp.solution import (
     STOPPED,
     Solution,
 )
+from qpsafe.text.given import numbers
 from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
 
-_FLOAT = np.dtype(np.float64)
 STATUS = (
     SOLVED,
     ROWS_INFEASIBLE,
@@ -39,6 +39,7 @@ STATUS = (
     FAILED,
     ILL_CONDITIONED,
 )  # hierarchy
+_EPSILON = "a number >= 0 in the unit of A, or one for each level"
 WORSE = 1e-8  # an answer whose level is worse than the judge's by more than this, relative above 1, is not returned
 _solve_packed: Callable[..., tuple[Array, NDArray[np.int64]]] | None = None
 
@@ -64,7 +65,7 @@ def solve_hierarchy(
         solver: "own" (the default), "daqp" (its hierarchical mode), "proxqp" (level by level in workspaces that are
             kept and warm started) or "qpsolvers:<name>" (one program per level). The built-in solver judges these:
             where they fail or a level comes out worse, its answer is returned, and `solver` and `note` say so.
-        rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper.
+        rows: hard rows `(G, lower, upper)`: lower <= G q̇ <= upper. They have no weights.
         damping: near a singular pose, directions in which an equality level has a singular value below this (unit of
             A) pass gradually to the levels below, so that q̇ stays bounded and continuous; levels above notice
             nothing. One number, or one per level; 0 means none. Own solver only.
@@ -76,12 +77,12 @@ def solve_hierarchy(
         box (a joint whose own limits are invalid gets 0). Numbers beyond 1e60 count as infinite.
 
     Raises:
-        ConfigurationError: for shapes that do not fit and unknown solvers.
+        ConfigurationError: for shapes that do not fit, anything but real numbers, and unknown solvers.
     """
     begin = perf_counter()
     problem = pack(levels, lower, upper, rows)
     near = _damping(damping, len(problem.counts) - problem.hard, problem.hard)
-    if solver is None or solver == "own":
+    if solver is None or (isinstance(solver, str) and solver == "own"):
         return _own(problem, begin, near)
     if near is not None:
         raise ConfigurationError("solve_hierarchy", "damping", damping, f'0 with solver {solver!r}; only "own" damps')
@@ -90,9 +91,14 @@ def solve_hierarchy(
 
 def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array | None:
     """ε of every level, hard rows first, which have none; None if all are 0."""
-    values = np.array(damping, _FLOAT)
+    if type(damping) is float and damping == 0.0:
+        return None
+    if type(damping) is float or (type(damping) is list and set(map(type, damping)) == {float}):
+        values = np.array(damping)
+    else:
+        values = numbers("solve_hierarchy", "damping", damping, _EPSILON)
     if values.shape not in ((), (levels,)) or not np.all((values >= 0.0) & (values < np.inf)):
-        expected = f"a number >= 0, or one for each of {counted(levels, 'level')}, in the unit of A"
+        expected = f"{_EPSILON}, here {counted(levels, 'level')}"
         raise ConfigurationError("solve_hierarchy", "damping", damping, expected)
     if not values.any():
         return None

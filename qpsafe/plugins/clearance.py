@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.errors import ConfigurationError
 from qpsafe.geometry.clearance import ClearanceLimit
 from qpsafe.geometry.clearance_level import ClearanceLevel
 from qpsafe.geometry.solids import Solids
 from qpsafe.hqp.solve import solve_hierarchy
 from qpsafe.limits import JointLimits
+from qpsafe.plugins.checks import checked_danger, checked_prefix, same_tick, updated
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import OnRobot, checked_prefix, same_tick, updated
+from qpsafe.plugins.rows import OnRobot
 from qpsafe.sensing.hulls import Obstacle
 
 Array = NDArray[np.float64]
@@ -45,20 +45,20 @@ class ClearanceRows(OnRobot):
             margin: How near the robot may come [m].
             prefix: What stands before the joints' names in the model.
         """
-        if not isinstance(danger, DangerMonitor):
-            raise ConfigurationError("ClearanceLimit", "danger", danger, "a DangerMonitor")
-        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("ClearanceLimit", prefix)
+        self.danger, self.prefix = checked_danger("ClearanceLimit", danger), checked_prefix("ClearanceLimit", prefix)
+        self.robot = danger.robot
         self.clearance = ClearanceLimit(danger.robot, Solids.of(danger.robot, known, carried), margin)
-        self._limits = JointLimits.of(danger.robot, danger.dt) if danger.limits is None else danger.limits
+        self._own = JointLimits.of(danger.robot, danger.dt)
 
     def level(self, configuration: Any, dt: float) -> tuple[ClearanceLevel, Array] | None:
         """Rows on q̇ (n,) and their widened bounds (rows,) [m/s]; None where nothing can come too near."""
         danger = same_tick(updated(self.danger), dt, "ClearanceLimit")
         state = self.at(configuration)
-        level = self.clearance.level(state, danger.qd, self._limits)
+        limits = self._own if isinstance(danger.limits, str) else danger.limits
+        level = self.clearance.level(state, danger.qd, limits)
         if level is None:
             return None
-        box = self._limits.box(state.q, danger.qd) if danger.box is None else danger.box
+        box = limits.box(state.q, danger.qd) if danger.box is None else danger.box
         best = solve_hierarchy([level], box.lower, box.upper).qd
         return level, np.maximum(level.upper, level.A @ best)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.robot import Robot
+from qpsafe.text.given import of_kind
 
 Array = NDArray[np.float64]
 
@@ -44,38 +45,77 @@ def mujoco_joints(model: Any, robot: Robot, prefix: str = "") -> JointMap:
         prefix: What stands before its joints' names there, as after `MjSpec.attach`.
 
     Raises:
-        ConfigurationError: A joint is missing.
+        ConfigurationError: A joint is missing or of another kind, or another joint moves the robot's base or links.
     """
     import mujoco
 
-    ids = []
-    for name in robot.joint_names:
-        found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, prefix + name)
-        if found < 0:
-            there = [model.joint(i).name for i in range(model.njnt)]
-            raise ConfigurationError("the MuJoCo model", "joint", prefix + name, f"one of {there}")
-        ids.append(found)
+    where = "the MuJoCo model"
+    of_kind(where, "model", model, mujoco.MjModel)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    ids = _by_name(where, names, robot, prefix)
+    kinds = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+    for i, slides in zip(ids, robot.sliding, strict=True):
+        _check_kind(where, names[i], kinds.get(int(model.jnt_type[i]), "of several numbers"), _MUJOCO[bool(slides)])
+    movers: set[int] = set()
+    for i in ids:
+        body = int(model.jnt_bodyid[i])
+        while body:  # up to the world
+            first = int(model.body_jntadr[body])
+            movers.update(range(first, first + int(model.body_jntnum[body])))
+            body = int(model.body_parentid[body])
+    _check_movers(where, [names[i] for i in sorted(movers.difference(ids))], robot, prefix)
     return JointMap(model.jnt_qposadr[ids].astype(np.intp), model.jnt_dofadr[ids].astype(np.intp), model.nv)
 
 
 def pinocchio_joints(model: Any, robot: Robot, prefix: str = "") -> JointMap:
-    """The robot's joints in a pinocchio model, by name; arguments as for `mujoco_joints`.
+    """The robot's joints in a pinocchio model, by name; arguments and errors as for `mujoco_joints`.
+
+    A continuous joint, which is not described by one number there, is of another kind.
 
     Args:
         model: pinocchio's.
         robot: Whose joints are looked for.
         prefix: Before their names in the model.
-
-    Raises:
-        ConfigurationError: A joint is missing, or is not described by one number (a continuous joint).
     """
-    q, v = [], []
-    for name in robot.joint_names:
-        if not model.existJointName(prefix + name):
-            raise ConfigurationError("the pinocchio model", "joint", prefix + name, f"one of {list(model.names)[1:]}")
-        joint = model.joints[model.getJointId(prefix + name)]
-        if joint.nq != 1:
-            raise ConfigurationError("the pinocchio model", prefix + name, joint.shortname(), "a joint of one number")
-        q.append(joint.idx_q)
-        v.append(joint.idx_v)
+    import pinocchio as pin
+
+    where = "the pinocchio model"
+    of_kind(where, "model", model, pin.Model)
+    names = list(model.names)
+    ids = _by_name(where, names, robot, prefix)
+    for i, slides in zip(ids, robot.sliding, strict=True):
+        kind = model.joints[i].shortname().removeprefix("JointModel")
+        # RX, RevoluteUnaligned; PX, PrismaticUnaligned
+        found = {"R": "revolute", "P": "prismatic"}.get(kind[0], kind) if model.joints[i].nq == 1 else kind
+        _check_kind(where, names[i], found, f"{_PINOCCHIO[bool(slides)]}, a joint of one number")
+    movers = {int(j) for i in ids for j in model.supports[i] if j}
+    _check_movers(where, [names[i] for i in sorted(movers.difference(ids))], robot, prefix)
+    joints = [model.joints[i] for i in ids]
+    q, v = ([getattr(joint, key) for joint in joints] for key in ("idx_q", "idx_v"))
     return JointMap(np.array(q, dtype=np.intp), np.array(v, dtype=np.intp), model.nv)
+
+
+#: What joints that turn and that slide are called.
+_MUJOCO, _PINOCCHIO = ("hinge", "slide"), ("revolute", "prismatic")
+
+
+def _by_name(where: str, names: list[str], robot: Robot, prefix: str) -> list[int]:
+    """Numbers of the robot's joints among the names of a model's."""
+    for name in robot.joint_names:
+        if prefix + name not in names:
+            raise ConfigurationError(where, "joint", prefix + name, f"one of {names}")
+    return [names.index(prefix + name) for name in robot.joint_names]
+
+
+def _check_kind(where: str, name: str, found: str, expected: str) -> None:
+    """Refuse a joint that moves otherwise than the robot's of this name."""
+    if found != expected.partition(",")[0]:
+        raise ConfigurationError(where, f"joint {name}", found, f"{expected}, as the robot's")
+
+
+def _check_movers(where: str, names: list[str], robot: Robot, prefix: str) -> None:
+    """Refuse other joints on the way from the world to the robot's, but those that its file holds in place."""
+    others = [name for name in names if name.removeprefix(prefix) not in robot.held]
+    if others:
+        expected = "none: qpsafe's robot stands still in its world, and only its own joints move its links"
+        raise ConfigurationError(where, "joints that move the robot", others, expected)

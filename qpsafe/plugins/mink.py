@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.extras import require
 from qpsafe.geometry.clearance import MARGIN
+from qpsafe.plugins.checks import checked_cost
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, mujoco_joints
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, checked_priority, release
+from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, ReleasableRows, TickRows
 from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
@@ -25,7 +26,10 @@ import mink  # noqa: E402
 
 Array = NDArray[np.float64]
 
-__all__ = ["ClearanceLimit", "ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask"]
+__all__ = [
+    "ClearanceLimit", "ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit", "ReleasableTask",
+    "SameTick",
+]  # fmt: skip
 
 
 class EvasiveTask(EvasiveRows, mink.Task):  # type: ignore[misc]
@@ -77,7 +81,7 @@ class ClikTask(ClikRows, mink.Task):  # type: ignore[misc]
         return mujoco_joints(model, self.robot, self.prefix)
 
 
-class ReleasableTask(mink.tasks.BaseTask):  # type: ignore[misc]
+class ReleasableTask(ReleasableRows, mink.tasks.BaseTask):  # type: ignore[misc]
     """One of mink's tasks, released in danger before the first one, as Table I releases the low-priority task.
 
     With an `EvasiveTask` in the same call this is `WeightedLaw`: the weight of task k is a_k / a_1 = f ... of its own.
@@ -94,11 +98,11 @@ class ReleasableTask(mink.tasks.BaseTask):  # type: ignore[misc]
     def __init__(self, task: Any, danger: DangerMonitor, priority: int = 2) -> None:
         if not isinstance(task, mink.tasks.BaseTask):
             raise ConfigurationError("ReleasableTask", "task", task, "one of mink's tasks")
-        self.task, self.danger, self.priority = task, danger, checked_priority(danger, priority)
+        self.set_up(task, danger, priority)
 
     def compute_qp_objective(self, configuration: Any) -> Any:
         """The task's objective times a_k / a_1."""
-        weight = release(self.danger, self.priority)
+        weight = self.release()
         H, c = self.task.compute_qp_objective(configuration)
         return mink.Objective(weight * H, weight * c)
 
@@ -107,7 +111,7 @@ class ReleasableTask(mink.tasks.BaseTask):  # type: ignore[misc]
         rows = self.task.compute_qp_residual(configuration)
         if rows is None:
             return None
-        weight = release(self.danger, self.priority)
+        weight = self.release()
         return math.sqrt(weight) * rows[0], math.sqrt(weight) * rows[1], weight * rows[2]
 
 
@@ -201,3 +205,25 @@ class JointLimit(BoxRows, mink.Limit):  # type: ignore[misc]
     def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
         """lo dt <= Δq <= hi dt as G Δq <= h."""
         return mink.Constraint(*self.rows(configuration, dt))
+
+
+class SameTick(TickRows, mink.Limit):  # type: ignore[misc]
+    """No limit, but a check: refuses a `solve_ik` whose dt is not that of its parts.
+
+    mink tells limits the dt of a call, and tasks nothing. `JointLimit`, `DangerLimit` and `ClearanceLimit` compare it
+    with their monitor's; this is for calls without them, and for `ClikTask`s.
+
+    Args:
+        parts: Monitors and `ClikTask`s of the call.
+
+    Raises:
+        ConfigurationError: There are none; at a `solve_ik` if its dt is another one.
+    """
+
+    def __init__(self, *parts: DangerMonitor | ClikRows) -> None:
+        self.set_up(parts)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
+        """Inactive."""
+        self.check(dt)
+        return mink.Constraint()

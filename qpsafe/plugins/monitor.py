@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +16,11 @@ from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits, checked_limits
 from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot, own_evasion
+from qpsafe.pipeline.sense import CLOUD
+from qpsafe.ranging.reduction.cloud import check_size, reduced
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
+from qpsafe.robot.wire import Wire
 from qpsafe.sensing.detection import (
     BadInput,
     as_joint_position,
@@ -35,7 +39,8 @@ Array = NDArray[np.float64]
 class DangerMonitor:
     """Danger of the detected points, eqs. (1)-(8), and the evasive velocity, (14)-(16): `update` it once a tick.
 
-    It does what `SafetyController.step` does before its law, for a loop that has a law of its own.
+    It does what `SafetyController.step` does before its law, for a loop that has a law of its own. `field`,
+    `activation`, `evasion`, `limits` and `ramp` may be exchanged, by assignment, between two ticks.
 
     Args:
         robot: The robot whose wire makes the field.
@@ -57,8 +62,8 @@ class DangerMonitor:
         switches: (m, f, ...) of eqs. (19), (21), smoothed by `ramp`; all 0 where the input was bad: the robot brakes.
         qd0: Evasive velocity (n,) [rad/s].
         box: Joint velocities that the limits admit, after bad input only braking; None without limits.
-        status: ``"ok"`` or ``"bad input"``.
-        message: What was wrong with the input, else empty.
+        status: ``"ok"`` or ``"bad_input"``.
+        message: What was wrong with the input, or that there were too many points; else empty.
 
     Raises:
         ConfigurationError: Names the argument that is wrong.
@@ -76,23 +81,81 @@ class DangerMonitor:
         ramp: float = 0.5,
         base: ArrayLike | None = None,
     ) -> None:
-        self.robot, self.dt = checked_robot("DangerMonitor", robot), checked_dt("DangerMonitor", dt)
-        self.ramp = number("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]", 0.0)
-        self.field = DangerField() if field is None else checked_field(field)
-        self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
-        if not isinstance(self.activation, Activation):
-            raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
-        self.evasion = own_evasion(self, checked_evasion(evasion, robot, self.dt))
-        self.limits = checked_limits("DangerMonitor", limits, robot, self.dt)
+        self._robot, self._dt = checked_robot("DangerMonitor", robot), checked_dt("DangerMonitor", dt)
         self._base = None if base is None else checked_pose("DangerMonitor", "base", base)
+        self._count = 0  # of switches; 0 until they are known
+        self.ramp, self.field = ramp, DangerField() if field is None else field
+        self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
+        self.evasion, self.limits = evasion, limits
+        self._within = (np.zeros(robot.nq),) * 2  # lowest and highest velocity that it may have been sent last
         self.reset()
 
+    @property
+    def robot(self) -> Robot:
+        """The robot, given for good."""
+        return self._robot
+
+    @property
+    def dt(self) -> float:
+        """Tick [s], given for good."""
+        return self._dt
+
+    @property
+    def ramp(self) -> float:
+        """Within this time at the earliest a released task comes back [s]."""
+        return self._ramp
+
+    @ramp.setter
+    def ramp(self, ramp: float) -> None:
+        self._ramp = number("DangerMonitor", "ramp", ramp, "a finite time >= 0 [s]", 0.0)
+
+    @property
+    def field(self) -> Any:
+        """The danger field."""
+        return self._field
+
+    @field.setter
+    def field(self, field: Any) -> None:
+        self._field = checked_field(field)
+
+    @property
+    def activation(self) -> Activation:
+        """Thresholds; another one has as many switches, which tasks were made for."""
+        return self._activation
+
+    @activation.setter
+    def activation(self, activation: Activation) -> None:
+        if not isinstance(activation, Activation):
+            raise ConfigurationError("DangerMonitor", "activation", activation, "an Activation")
+        if self._count not in (0, len(activation.levels)):
+            expected = f"an Activation with as many switches as before, {self._count}"
+            raise ConfigurationError("DangerMonitor", "activation", activation, expected)
+        self._activation, self._count = activation, len(activation.levels)
+
+    @property
+    def evasion(self) -> Evasion:
+        """The admittance (16); its velocity is remembered in it."""
+        return self._evasion
+
+    @evasion.setter
+    def evasion(self, evasion: Evasion | str | None) -> None:
+        self._evasion = own_evasion(self, checked_evasion(evasion, self._robot, self._dt))
+
+    @property
+    def limits(self) -> JointLimits | Literal["off"]:
+        """Joint limits, from the next update on."""
+        return "off" if self._limits is None else self._limits
+
+    @limits.setter
+    def limits(self, limits: JointLimits | str | None) -> None:
+        self._limits = checked_limits("DangerMonitor", limits, self._robot, self._dt)
+
     def reset(self) -> None:
-        """Forget the past: no points, no evasive velocity."""
-        self.evasion.reset()
-        self.ticks = 0
-        self._within = (np.zeros(self.robot.nq),) * 2  # lowest and highest velocity that it may have been sent last
+        """Forget what was near: no points, no evasive velocity. From its last velocity the robot has to brake still."""
+        self._evasion.reset()
+        self.ticks, within = 0, self._within
         self._bad("not updated yet")
+        self._within = within
         self.status, self.message = OK, ""
         self._last = (1.0,) * len(self.switches)
 
@@ -107,7 +170,8 @@ class DangerMonitor:
         Args:
             q: Joint position (n,) [rad].
             qd: Joint velocity (n,) [rad/s], e.g. what the last `solve_ik` returned.
-            points: Detected points (p, 3) [m]; an empty list where nothing is in sight.
+            points: Detected points (p, 3) [m]; an empty list where nothing is in sight. More than 1,000 are reduced to
+                those nearest to the links, which `message` says; more than 20,000 are bad input.
         """
         self.ticks += 1
         try:
@@ -122,9 +186,7 @@ class DangerMonitor:
         q, qd = as_joint_position(q, self.robot), as_joint_velocity(qd, self.robot)
         state = self.robot.at(q)
         wire = state.wire(qd)
-        if self._base is not None:
-            points = _into(self._base, points)
-        points = as_points(points).copy()
+        points, message = self._own(as_points(points), wire)
         links = np.empty(len(points), dtype=np.int64)
         if not find_nearest(points, wire.starts, wire.ends, links):
             refuse_points(points)
@@ -139,9 +201,29 @@ class DangerMonitor:
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
         self.qd0 = self.evasion.step(torque).copy()  # (16)
-        self.box: Box | None = None if self.limits is None else self.limits.box(q, qd)
+        self.box: Box | None = None if self._limits is None else self._limits.box(q, qd)
         self._within = (qd, qd) if self.box is None else (self.box.lower, self.box.upper)
-        self.status, self.message = OK, ""
+        self.status, self.message = OK, message
+
+    def _own(self, points: Array, wire: Wire) -> tuple[Array, str]:
+        """Points as seen from the base, copied; clouds reduced as `SafetyController.step` does, and what is said then.
+
+        Args:
+            points: In the world (p, 3) [m].
+            wire: Of the robot now.
+        """
+        given = len(points)
+        if given > CLOUD:
+            check_size(points)
+        if self._base is None:
+            points = points.copy()
+        else:
+            with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by who comes next
+                points = (points - self._base[:3, 3]) @ self._base[:3, :3]
+        if given <= CLOUD:
+            return points, ""
+        points = reduced(points, wire)
+        return points, f"{given} points are reduced to those nearest to the links, {len(points)}"
 
     def _ramped(self, switches: tuple[float, ...]) -> tuple[float, ...]:
         """Fall within a few ticks, with the time constant ramp / 25; rise by at most dt / ramp.
@@ -161,7 +243,7 @@ class DangerMonitor:
         self.state, self.qd, self.qd0 = None, np.zeros(n), np.zeros(n)
         self.points, self.danger, self.cdf_n = np.empty((0, 3)), np.empty(0), math.nan
         self.switches = self._last = (0.0,) * len(self.activation.levels)
-        self.box = None if self.limits is None else self._braking(self.limits.max_acceleration * self.dt)
+        self.box = None if self._limits is None else self._braking(self._limits.max_acceleration * self.dt)
         self.status, self.message = BAD_INPUT, message
 
     def _braking(self, most: Array) -> Box:
@@ -174,14 +256,3 @@ class DangerMonitor:
         self._within = slowest, slowest
         no_kind = np.zeros(len(slowest), dtype=np.int64)
         return Box(slowest, slowest.copy(), no_kind, no_kind, no_kind)
-
-
-def _into(base: Array, points: ArrayLike) -> ArrayLike:
-    """Points of the world as seen from the base; what is no (p, 3) array is left to the check behind."""
-    try:
-        array = np.asarray(points)
-    except Exception:  # whatever a stranger's __array__ raises
-        return points
-    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
-        return points
-    return (array - base[:3, 3]) @ base[:3, :3]

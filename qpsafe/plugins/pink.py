@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from qpsafe.errors import ConfigurationError
 from qpsafe.extras import require
 from qpsafe.geometry.clearance import MARGIN
+from qpsafe.plugins.checks import checked_cost
 from qpsafe.plugins.clearance import Carried, ClearanceRows
 from qpsafe.plugins.joints import JointMap, pinocchio_joints
 from qpsafe.plugins.monitor import DangerMonitor
-from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, checked_cost, checked_priority, release
+from qpsafe.plugins.rows import BoxRows, ClikRows, DangerRows, EvasiveRows, ReleasableRows, TickRows
 from qpsafe.robot.robot import Robot
 from qpsafe.sensing.hulls import Obstacle
 from qpsafe.tasks.task import Task
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 __all__ = [
     "ClearanceBarrier", "ClearanceLimit", "ClikTask", "DangerLimit", "DangerMonitor", "EvasiveTask", "JointLimit",
-    "ReleasableTask",
+    "ReleasableTask", "SameTick",
 ]  # fmt: skip
 
 
@@ -82,7 +83,7 @@ class ClikTask(ClikRows, PinkTask):  # type: ignore[misc]
         return f"ClikTask({self.task.name}, cost={self.cost}, dt={self.dt})"
 
 
-class ReleasableTask(PinkTask):  # type: ignore[misc]
+class ReleasableTask(ReleasableRows, PinkTask):  # type: ignore[misc]
     """One of pink's tasks, released in danger before the first one, as Table I releases the low-priority task.
 
     As `qpsafe.plugins.mink.ReleasableTask`, with the same arguments.
@@ -97,7 +98,7 @@ class ReleasableTask(PinkTask):  # type: ignore[misc]
         if not isinstance(task, PinkTask):
             raise ConfigurationError("ReleasableTask", "task", task, "one of pink's tasks")
         super().__init__(cost=task.cost, gain=task.gain, lm_damping=task.lm_damping)
-        self.task, self.danger, self.priority = task, danger, checked_priority(danger, priority)
+        self.set_up(task, danger, priority)
 
     def compute_error(self, configuration: Any) -> Array:
         """The task's own."""
@@ -109,7 +110,7 @@ class ReleasableTask(PinkTask):  # type: ignore[misc]
 
     def compute_qp_objective(self, configuration: Any) -> tuple[Array, Array]:
         """The task's objective times a_k / a_1."""
-        weight = release(self.danger, self.priority)
+        weight = self.release()
         H, c = self.task.compute_qp_objective(configuration)
         return weight * H, weight * c
 
@@ -240,3 +241,20 @@ class JointLimit(BoxRows, PinkLimit):  # type: ignore[misc]
     def compute_qp_inequalities(self, configuration: Any, dt: float) -> tuple[Array, Array]:
         """lo dt <= Δq <= hi dt as G Δq <= h."""
         return self.rows(configuration, dt)
+
+
+class SameTick(TickRows, PinkLimit):  # type: ignore[misc]
+    """No limit, but a check: refuses a `solve_ik` whose dt is not that of its parts.
+
+    As `qpsafe.plugins.mink.SameTick`, with the same arguments.
+
+    Args:
+        parts: Monitors and `ClikTask`s of the call.
+    """
+
+    def __init__(self, *parts: DangerMonitor | ClikRows) -> None:
+        self.set_up(parts)
+
+    def compute_qp_inequalities(self, configuration: Any, dt: float) -> None:
+        """Nothing."""
+        self.check(dt)

@@ -16,20 +16,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.laws.barrier import DangerBarrier
-from qpsafe.pipeline.checks import checked_dt, checked_robot
+from qpsafe.pipeline.checks import ABSURD_STEP, checked_dt, checked_robot
+from qpsafe.plugins.checks import (
+    DEAREST,
+    check_tick,
+    checked_cost,
+    checked_danger,
+    checked_prefix,
+    checked_priority,
+    same_tick,
+    updated,
+)
 from qpsafe.plugins.joints import JointMap
 from qpsafe.plugins.monitor import DangerMonitor
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.tasks.task import Task
-from qpsafe.text.given import number, numbers, whole
+from qpsafe.text.given import number, numbers
 
 Array = NDArray[np.float64]
+_FLOAT = np.dtype(np.float64)
 
 #: m counts as at least this where a cost is divided by it: a released task keeps a millionth of the weight.
 LEAST = 1e-6
-#: No row may cost more: solvers square it.
-DEAREST = 1e100
 
 
 class OnRobot:
@@ -79,10 +88,9 @@ class EvasiveRows(OnRobot):
             against: About what the tasks cost that are to give way.
             prefix: What stands before the joints' names in the model.
         """
-        if not isinstance(danger, DangerMonitor):
-            raise ConfigurationError("EvasiveTask", "danger", danger, "a DangerMonitor")
+        self.danger, self.prefix = checked_danger("EvasiveTask", danger), checked_prefix("EvasiveTask", prefix)
+        self.robot = danger.robot
         self.against = number("EvasiveTask", "against", against, f"a cost >= 0, up to {DEAREST:g}", 0.0, most=DEAREST)
-        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("EvasiveTask", prefix)
         self.cost = cost
 
     @property
@@ -173,17 +181,23 @@ class DangerRows(OnRobot):
             points: How many of the most dangerous points get a row.
             prefix: What stands before the joints' names in the model.
         """
-        if not isinstance(danger, DangerMonitor):
-            raise ConfigurationError("DangerLimit", "danger", danger, "a DangerMonitor")
-        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("DangerLimit", prefix)
+        self.danger, self.prefix = checked_danger("DangerLimit", danger), checked_prefix("DangerLimit", prefix)
+        self.robot = danger.robot
         self.barrier = DangerBarrier(delta_max, horizon, points, danger.field)
+
+    def cap(self) -> DangerBarrier:
+        """The cap on the field that the monitor has now."""
+        if self.barrier.field is not self.danger.field:
+            old = self.barrier
+            self.barrier = DangerBarrier(old.delta_max, old.horizon, old.points, self.danger.field)
+        return self.barrier
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array] | None:
         """(G, h) with G Δq <= h, or None where there are no points."""
         danger = same_tick(updated(self.danger), dt, "DangerLimit")
         if danger.state is None:
             return None
-        level = self.barrier.level(danger.state, danger.qd, danger.points, danger.danger)
+        level = self.cap().level(danger.state, danger.qd, danger.points, danger.danger)
         if level is None:
             return None
         room = np.maximum(level.upper, 0.0)
@@ -191,19 +205,33 @@ class DangerRows(OnRobot):
             room = np.maximum(room, level.A @ danger.box.clip(np.zeros(self.robot.nq)))
         return self.joints(configuration).spread(level.A), room * dt
 
-    def guard(self, configuration: Any, velocity: Array) -> Array:
+    def guard(self, configuration: Any, velocity: ArrayLike) -> Array:
         """The velocity (nv,) scaled down so that CDF <= Δ_max exactly, wherever the static field leaves room for it.
 
-        The acceleration limits come first, if the monitor has limits: braking takes its time.
+        The acceleration limits come first, if the monitor has limits: braking takes its time. In a tick of bad input
+        they are all that is known. A velocity that is not finite, or absurd, is replaced by the robot's braking and
+        standstill of all else.
+
+        Args:
+            configuration: Of mink or pink.
+            velocity: What `solve_ik` answered (nv,) [rad/s].
+
+        Raises:
+            ConfigurationError: It is no array of as many numbers as the model has velocities.
         """
-        danger = updated(self.danger)
-        if danger.state is None or not np.isfinite(velocity).all():
-            return velocity
-        of_robot = self.joints(configuration).v
-        scaled = self.barrier.scale(danger.state, velocity[of_robot], danger.points).factor * velocity
+        danger, place = updated(self.danger), self.joints(configuration)
+        given = velocity
+        if not (type(given) is np.ndarray and given.dtype == _FLOAT):
+            given = numbers("DangerLimit.guard", "velocity", velocity, f"{place.nv} numbers [rad/s]")
+        if given.shape != (place.nv,):
+            raise ConfigurationError("DangerLimit.guard", "velocity.shape", given.shape, f"({place.nv},)")
+        good = bool((np.abs(given) < ABSURD_STEP / danger.dt).all())  # false for NaN
+        guarded = given.copy() if good else np.zeros(place.nv)
+        if good and danger.state is not None:
+            guarded *= self.cap().scale(danger.state, given[place.v], danger.points).factor
         if danger.box is not None:
-            scaled[of_robot] = danger.box.clip(scaled[of_robot])
-        return scaled
+            guarded[place.v] = danger.box.clip(guarded[place.v])
+        return guarded
 
 
 class BoxRows(OnRobot):
@@ -213,81 +241,54 @@ class BoxRows(OnRobot):
 
     def set_up(self, danger: DangerMonitor, prefix: str) -> None:
         """Check and keep the arguments of the constructor."""
-        if not isinstance(danger, DangerMonitor):
-            raise ConfigurationError("JointLimit", "danger", danger, "a DangerMonitor")
-        if danger.limits is None:
+        self.danger, self.prefix = checked_danger("JointLimit", danger), checked_prefix("JointLimit", prefix)
+        self.robot = danger.robot
+        if danger.limits == "off":
             raise ConfigurationError("JointLimit", "danger.limits", "off", "a DangerMonitor with limits")
-        self.danger, self.robot, self.prefix = danger, danger.robot, checked_prefix("JointLimit", prefix)
 
     def rows(self, configuration: Any, dt: float) -> tuple[Array, Array]:
         """(G, h) with G Δq <= h, two rows a joint."""
         danger = same_tick(updated(self.danger), dt, "JointLimit")
         unit = self.joints(configuration).spread(np.eye(self.robot.nq))
-        assert danger.box is not None  # since it has limits
+        if danger.box is None:
+            raise ConfigurationError("JointLimit", "danger.limits", danger.limits, "limits since its last update")
         return np.vstack((unit, -unit)), np.concatenate((danger.box.upper, -danger.box.lower)) * dt
 
 
-def updated(danger: DangerMonitor) -> DangerMonitor:
-    """The monitor, if it has ever been told anything: silence is not safety."""
-    if danger.ticks == 0:
-        expected = "danger.update(q, qd, points) before solve_ik, with points=[] where nothing is in sight"
-        raise ConfigurationError("DangerMonitor", "ticks", 0, expected)
-    return danger
+class TickRows:
+    """No rows: only a check of the tick, which `solve_ik` tells limits and not tasks."""
+
+    parts: tuple[DangerMonitor | ClikRows, ...]
+
+    def set_up(self, parts: tuple[DangerMonitor | ClikRows, ...]) -> None:
+        """Check and keep the arguments of the constructor."""
+        if not (parts and all(isinstance(part, DangerMonitor | ClikRows) for part in parts)):
+            raise ConfigurationError("SameTick", "parts", parts, "DangerMonitors and ClikTasks, at least one")
+        self.parts = parts
+
+    def check(self, dt: float) -> None:
+        """Refuse another tick [s] than the parts'."""
+        for part in self.parts:
+            check_tick(part, dt, "SameTick")
 
 
-def same_tick(danger: DangerMonitor, dt: float, where: str) -> DangerMonitor:
-    """The monitor, if it has the tick that `solve_ik` was called with.
+class ReleasableRows:
+    """A task of theirs that danger releases: it stands in a call of `solve_ik`, and is no task to convert."""
 
-    Args:
-        danger: The monitor.
-        dt: That tick [s].
-        where: Who asks, for the error.
-    """
-    if not math.isclose(dt, danger.dt, rel_tol=1e-9):
-        raise ConfigurationError(where, "dt", dt, f"the tick of its DangerMonitor, {danger.dt} s")
-    return danger
+    task: Any
+    danger: DangerMonitor
+    priority: int
 
+    def set_up(self, task: Any, danger: DangerMonitor, priority: int) -> None:
+        """Check and keep the arguments of the constructor.
 
-def checked_priority(danger: DangerMonitor, priority: int) -> int:
-    """The priority of a task that danger releases, if the monitor has a threshold for it.
+        Args:
+            task: One of theirs.
+            danger: What is near the robot.
+            priority: From 2.
+        """
+        self.task, self.danger, self.priority = task, danger, checked_priority(danger, priority)
 
-    Args:
-        danger: The monitor.
-        priority: As given, from 1.
-    """
-    if not isinstance(danger, DangerMonitor):
-        raise ConfigurationError("ReleasableTask", "danger", danger, "a DangerMonitor")
-    count = len(danger.activation.levels)
-    return whole("ReleasableTask", "priority", priority, f"1 to {count}, one a threshold", 1, count)
-
-
-def release(danger: DangerMonitor, priority: int) -> float:
-    """a_k / a_1 = f ... of the task of priority k (from 1): how much of its weight is left against the first."""
-    return math.prod(updated(danger).switches[1:priority])
-
-
-def checked_cost(where: str, cost: ArrayLike, rows: int) -> Array:
-    """A cost for every row (rows,), from one number or as many.
-
-    Args:
-        where: Who asks, for the error.
-        cost: As given.
-        rows: How many there are.
-    """
-    expected = f"a number from 0 to {DEAREST:g}, or {rows} of them"
-    array = numbers(where, "cost", cost, expected)
-    if array.shape not in ((), (1,), (rows,)) or not ((array >= 0.0) & (array <= DEAREST)).all():  # false for NaN
-        raise ConfigurationError(where, "cost", cost, expected)
-    return np.broadcast_to(array, rows).copy()
-
-
-def checked_prefix(where: str, prefix: str) -> str:
-    """What stands before names in a model, if it is text.
-
-    Args:
-        where: Who asks, for the error.
-        prefix: As given.
-    """
-    if not isinstance(prefix, str):
-        raise ConfigurationError(where, "prefix", prefix, 'text before names of the model, e.g. "arm_"; "" for none')
-    return prefix
+    def release(self) -> float:
+        """a_k / a_1 = f ... of the task of priority k: how much of its weight is left against the first."""
+        return math.prod(updated(self.danger).switches[1 : self.priority])

@@ -193,6 +193,7 @@ def test_joints_are_found_by_name():
     with pytest.raises(qpsafe.ConfigurationError, match="left_joint_1"):
         pinocchio_joints(PIN, ROBOT, "left_")
     continuous = pin.Model()
-    continuous.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "joint_1")
+    for k, name in enumerate(ROBOT.joint_names):
+        continuous.addJoint(k, pin.JointModelRUBZ(), pin.SE3.Identity(), name)
     with pytest.raises(qpsafe.ConfigurationError, match="one number"):
         pinocchio_joints(continuous, ROBOT)
