@@ -36,6 +36,7 @@ class Cycle:
         missed: Packets missing since the last cycle, lost or superseded by this one.
         deviation: How far every joint is from what it was sent (n,) [rad].
         notes: What is unusual, in words.
+        waited: How long the packet had waited unread at this computer [s].
     """
 
     packet: RobotPacket
@@ -45,6 +46,7 @@ class Cycle:
     missed: int
     deviation: Array
     notes: tuple[str, ...] = ()
+    waited: float = 0.0
 
     @property
     def moving(self) -> bool:

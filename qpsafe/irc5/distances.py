@@ -30,7 +30,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.transport.addresses import host_address, peer_address, udp_port
 from qpsafe.irc5.transport.arrival import Waits, receive
 from qpsafe.sensing.rules import SensingRules
-from qpsafe.text.given import whole
+from qpsafe.text.given import MOST, number, numbers, whole
 from qpsafe.text.words import counted
 
 Array = NDArray[np.float64]
@@ -41,8 +41,8 @@ CLOCK_ERROR = SensingRules.clock_error
 #: What came less than this before it was first read counts as new [s]: half the age at which distances are stale, so
 #: that a run in lock-step, where a busy computer takes its time, is the same to the bit as one without a wire.
 NEW = 0.5 * SensingRules.max_age
-#: Most spots of a datagram without ages.
-MOST_SPOTS = 8185
+#: Most spots of a datagram without ages, and with them: 65,507 bytes fit into one.
+MOST_SPOTS, MOST_AGED = 8185, 4092
 _HEAD = struct.Struct("<4sBBHIIQ")
 _MAGIC, _VERSION, _AGES = b"QPSD", 1, 1
 
@@ -64,19 +64,28 @@ class Distances(NamedTuple):
 
 
 def encode(distances: Distances) -> bytes:
-    """As a datagram."""
+    """As a datagram, one that `decode` reads.
+
+    Raises:
+        ConfigurationError: Values or ages are no list of numbers, not as many of both, or more than fit; sequence
+            number or time is none.
+    """
     ages = distances.ages
-    head = _HEAD.pack(
-        _MAGIC,
-        _VERSION,
-        0 if ages is None else _AGES,
-        len(distances.values),
-        distances.seq % 2**32,
-        0,
-        round(1e6 * distances.time) % 2**64,
-    )
-    body = np.asarray(distances.values, dtype="<f8").tobytes()
-    return head + body + (b"" if ages is None else np.asarray(ages, dtype="<f8").tobytes())
+    most = MOST_SPOTS if ages is None else MOST_AGED
+    expected = f"distances (k,) [m], k at most {most} {'without' if ages is None else 'with'} ages"
+    rows = [numbers("distances", "values", distances.values, expected, 1)]
+    k = len(rows[0])
+    if k > most:
+        raise ConfigurationError("distances", "values", rows[0].shape, expected)
+    if ages is not None:
+        rows.append(numbers("distances", "ages", ages, f"ages ({k},) [s], one a distance", 1))
+        if len(rows[1]) != k:
+            raise ConfigurationError("distances", "ages", rows[1].shape, f"ages ({k},) [s], one a distance")
+    seq = whole("distances", "seq", distances.seq, "a whole number", -MOST)
+    micros = round(1e6 * number("distances", "time", distances.time, "a time [s]", -1e15, most=1e15))
+    flags = 0 if ages is None else _AGES
+    head = _HEAD.pack(_MAGIC, _VERSION, flags, k, seq % 2**32, 0, micros % 2**64)
+    return head + b"".join(row.astype("<f8").tobytes() for row in rows)
 
 
 def decode(data: bytes, count: int) -> Distances | None:
@@ -230,7 +239,15 @@ class SensorOutput:
         self._seq = 0
 
     def send(self, values: Array, ages: Array | None = None) -> None:
-        """Send one sampling; nobody listening is no error."""
+        """Send one sampling; nobody listening is no error.
+
+        Args:
+            values: Distances (k,) [m].
+            ages: How old each of them is (k,) [s]; None: they are new.
+
+        Raises:
+            ConfigurationError: They are no such numbers, or more than fit into a datagram, as for `encode`.
+        """
         with suppress(OSError):
             self._socket.sendto(encode(Distances(self._seq, time.time(), values, ages)), self._address)
         self._seq = (self._seq + 1) % 2**32

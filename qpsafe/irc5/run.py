@@ -8,6 +8,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from qpsafe.errors import ConfigurationError, in_words
 from qpsafe.irc5.distances import SensorInput
 from qpsafe.irc5.loop import ROBOT, StreamLoop
 from qpsafe.irc5.process.latency import Latency
@@ -15,8 +16,8 @@ from qpsafe.irc5.process.realtime import resident
 from qpsafe.irc5.process.requests import Requests
 from qpsafe.irc5.process.watchdog import Watchdog
 from qpsafe.irc5.streamer import EgmStreamer
-from qpsafe.irc5.supervisor import State, StopCategory
-from qpsafe.text.given import number, of_kind, to_call
+from qpsafe.irc5.supervisor import State, StopCategory, cause_in_words
+from qpsafe.text.given import number, of_kind, parts, to_call
 from qpsafe.tick import Tick
 
 WAIT = 0.02  # longest time between two heartbeats [s]
@@ -98,21 +99,36 @@ def run_stream(
         clock: Tells the time [s].
 
     Raises:
-        ConfigurationError: An argument is of another kind; before anything is sent.
+        ConfigurationError: An argument is of another kind, the loop is another streamer's, or the watchdog does not
+            watch; before anything is sent.
     """
-    _check(sensors, duration, patience)
-    for key, value in {"on_tick": on_tick, "on_events": on_events, "on_second": on_second}.items():
-        if value is not None:
-            to_call("run_stream", key, value)
-    run, requests = StreamRun(), Requests() if requests is None else requests
-    watched = [*helpers] if watchdog is None else [watchdog.trouble, *helpers]
-    heard = first = second = clock()
+    requests = Requests() if requests is None else requests
+    kinds = {"streamer": (streamer, EgmStreamer), "loop": (loop, StreamLoop), "requests": (requests, Requests)}
+    kinds |= {"sensors": (sensors, SensorInput), "watchdog": (watchdog, Watchdog)}
+    for key, (value, kind) in kinds.items():
+        if value is not None or key in ("streamer", "loop"):
+            of_kind("run_stream", key, value, kind)
+    for key, each in {"on_tick": on_tick, "on_events": on_events, "on_second": on_second}.items():
+        if each is not None:
+            to_call("run_stream", key, each)
+    watched = [] if watchdog is None else [watchdog.trouble]
+    watched += parts("run_stream", "helpers", helpers, "a list of functions")
+    for helper in watched:
+        to_call("run_stream", "helpers", helper)
+    _check_times(duration, patience)
+    if loop.session is not streamer.session:
+        raise ConfigurationError("run_stream", "loop", loop, "a loop that has the streamer's session")
+    if watchdog is not None and not watchdog.alive:
+        raise ConfigurationError("run_stream", "watchdog", watchdog, "one that watches: inside its `with` block")
+    run = StreamRun()
+    heard = first = second = _began(clock)
     check = -math.inf
 
     def leave(cause: str) -> None:
         loop.stop(StopCategory.CONTROLLED_THEN_SILENT, cause)
 
     def trouble(cause: str) -> None:
+        cause = cause_in_words(cause)  # whatever a helper says
         if cause not in run.troubles:
             run.troubles.append(cause)
         leave(cause)
@@ -186,9 +202,18 @@ def run_stream(
     return run
 
 
-def _check(sensors: SensorInput | None, duration: float | None, patience: float) -> None:
-    if sensors is not None:
-        of_kind("run_stream", "sensors", sensors, SensorInput)
+def _began(clock: Callable[[], float]) -> float:
+    """What the clock tells, if it tells a time [s]."""
+    to_call("run_stream", "clock", clock)
+    expected = "a function that tells the time [s]"
+    try:
+        now = clock()
+    except Exception as error:
+        raise ConfigurationError("run_stream", "clock", clock, f"{expected} ({in_words(error)})") from None
+    return number("run_stream", "clock", now, expected)
+
+
+def _check_times(duration: float | None, patience: float) -> None:
     if duration is not None:
         number("run_stream", "duration", duration, "a finite time >= 0 [s], or None", 0.0)
     if not (isinstance(patience, float) and patience == math.inf):

@@ -13,6 +13,7 @@ from qpsafe.irc5.cycle import Cycle, Phase
 from qpsafe.irc5.messages import WRAP, RobotPacket, SensorPacket, encode_sensor
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.shaper import Shaper
+from qpsafe.irc5.supervisor import cause_in_words
 from qpsafe.irc5.transport.addresses import peer_address
 from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.irc5.transport.inbox import Arrival, Inbox, Sender
@@ -41,6 +42,7 @@ class EgmSession:
         phase: Now.
         causes: Why it stopped, until acknowledged.
         counts: What became of datagrams (see `Inbox`), and: ``answered``, ``superseded`` (dropped for a newer packet),
+            ``late`` (not answered: the newest had waited unread for longer than the rules' silence),
             ``bad_reference`` (of the source: none, inactive or unusable; the robot brakes meanwhile), ``clipped``.
         q, qd: The reference last answered (n,) [rad, rad/s].
 
@@ -78,6 +80,7 @@ class EgmSession:
         self._shaper = Shaper(limits, self.rules.ramp_in, self.rules.ramp_out, self.rules.catch_up)
         self._recent = np.zeros((max(1, round(self.rules.lag / limits.dt)), self.n))  # what was sent last, a ring
         self._arrival: Arrival | None = None
+        self._waited = 0.0  # unread [s]
         self._anew, self._missed = False, 0
         self._cycle: Cycle | None = None
         self._before: RobotPacket | None = None
@@ -107,29 +110,30 @@ class EgmSession:
         """Whom to answer: the robot's address and port, None before its first valid packet."""
         return self.inbox.sender
 
-    def offer(self, data: bytes, sender: Sender, now: float) -> bool:
-        """Take in a datagram; `now` is a monotonic clock [s]. Returns whether it is the newest packet of the robot.
+    def offer(self, data: bytes, sender: Sender, now: float, waited: float = 0.0) -> bool:
+        """Take in a datagram. Returns whether it is the newest packet of the robot.
 
         Args:
             data: As received.
             sender: Its address.
             now: Monotonic clock [s].
+            waited: How long it had waited unread [s].
         """
         self._now = now
-        arrival = self.inbox.offer(data, sender, now)
+        arrival = self.inbox.offer(data, sender, now - waited)
         if arrival is None:
             return False
         if self._arrival is not None:
             self.counts["superseded"] += 1
             self._missed += 1
-        self._arrival = arrival
+        self._arrival, self._waited = arrival, waited
         self._anew |= arrival.restarted or bool(self._closed(arrival.packet))  # even if superseded
         self._missed = 0 if arrival.restarted else self._missed + arrival.missed
         return True
 
     def stop(self, cause: str) -> None:
         """Bring the robot to rest, and hold it until `acknowledge`."""
-        self._released = False
+        self._released, cause = False, cause_in_words(cause)
         if cause not in self.causes:
             self.causes = (*self.causes, cause)
         if self.phase in (Phase.RAMPING, Phase.RUNNING):
@@ -149,9 +153,16 @@ class EgmSession:
         return True
 
     def take(self) -> Cycle | None:
-        """The cycle of the newest packet, once; None if none has arrived."""
+        """The cycle of the newest packet, once; None if none has arrived.
+
+        One that had waited for longer than the rules' silence is as good as none, but for a robot's very first.
+        """
         arrival, self._arrival = self._arrival, None
         if arrival is None:
+            return None
+        waited = self._waited
+        if waited > self.rules.silence and self.counts["answered"]:
+            self.counts["late"] += 1
             return None
         anew, missed = self._anew, self._missed
         self._anew, self._missed = False, 0
@@ -159,6 +170,7 @@ class EgmSession:
         qd = np.zeros(self.n) if arrival.restarted else self._velocity(packet)
         self._before = packet
         notes = [f"{counted(missed, 'packet')} missed"] if missed else []
+        notes += [f"it had waited unread for {waited:.3g} s"] if waited > self.rules.lag else []
 
         closed = self._closed(packet)
         if self._released and not self.qd.any():
@@ -179,7 +191,7 @@ class EgmSession:
             self._check(deviation)
         if self.causes:
             notes.append("stopped: " + "; ".join(self.causes))
-        self._cycle = Cycle(packet, qd, self.phase, seeded, missed, deviation, tuple(notes))
+        self._cycle = Cycle(packet, qd, self.phase, seeded, missed, deviation, tuple(notes), waited)
         return self._cycle
 
     def answer(self, reference: JointReference | None) -> bytes | None:

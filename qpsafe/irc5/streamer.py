@@ -15,7 +15,7 @@ from qpsafe.irc5.messages import DEFAULT_PORT, MAX_SIZE
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.session import Cycle, EgmSession, Phase
 from qpsafe.irc5.transport.addresses import interface_address, peer_address, udp_port
-from qpsafe.irc5.transport.arrival import ask_for_times, receive
+from qpsafe.irc5.transport.arrival import Waits, receive
 from qpsafe.irc5.transport.axes import Axes
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
@@ -81,7 +81,8 @@ class EgmStreamer:
             raise ConfigurationError("EgmStreamer", "host", found, f"an address to listen at ({error})") from None
         self._socket.setblocking(False)
         self.address: tuple[str, int] = self._socket.getsockname()
-        self.stamped = ask_for_times(self._socket)
+        self._waits = Waits(self._socket)
+        self.stamped = self._waits.stamped
         self.response = 0.0
         self._arrived = 0  # real-time clock, of the oldest packet since the last answer [ns]; 0 without one
 
@@ -170,15 +171,18 @@ class EgmStreamer:
             self.close()
 
     def _drain(self) -> None:
-        """Offer everything that has arrived."""
-        now = time.monotonic()
+        """Offer everything that has arrived, with how long it has waited, where the kernel tells that."""
+        self._waits.look()
         for _ in range(MOST_AT_ONCE):
             try:
                 data, sender, arrived = receive(self._socket, MAX_SIZE + 1)  # what fills it is too long
             except BlockingIOError:
+                self._waits.emptied()
                 return
             except OSError:  # an earlier answer found nobody
                 self.counts["not_received"] += 1
                 continue
-            if self.session.offer(data, sender, now) and self._arrived == 0:
+            self._waits.look()  # again: what came after the first look is not as old as it can be
+            waited = self._waits.of(arrived) if self.stamped else 0.0
+            if self.session.offer(data, sender, time.monotonic(), waited) and self._arrived == 0:
                 self._arrived = arrived

@@ -9,13 +9,15 @@ This is no safety function: it runs on an ordinary computer, in Python. It order
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections import deque
 from collections.abc import Callable
 from enum import IntEnum, StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from qpsafe.errors import in_words, represented
 from qpsafe.text.given import to_call, whole
 
 
@@ -92,11 +94,18 @@ _MORE = "further causes, not listed"
 _FIGURE = re.compile(r"0x[0-9a-fA-F]+|[-+]?\d*\.\d+(?:[eE][-+]?\d+)?|[-+]?\d+\.?[eE][-+]?\d+")
 
 
+def cause_in_words(cause: Any) -> str:
+    """A cause as text that says something, whatever was given as one; never raises."""
+    if not isinstance(cause, str):
+        cause = in_words(cause) if isinstance(cause, BaseException) else represented(cause)
+    return cause or "no cause given"
+
+
 class Transition(NamedTuple):
     """One line of the log.
 
     Attributes:
-        time: On the supervisor's clock [s].
+        time: On the supervisor's clock [s]; NaN if that failed.
         before, after: States; equal if the category alone rose, or another cause was added.
         event: What happened.
         category: Of the stop, from its request until it is acknowledged.
@@ -119,10 +128,10 @@ class Supervisor:
     """Where the stream stands, and why.
 
     Nothing here raises in the loop: an event that does not fit the state is ignored, and the call returns False. A
-    cause that differs from a known one in measured figures only is that one.
+    cause that differs from a known one in measured figures only is that one; one that is no text is put into words.
 
     Args:
-        clock: Tells the time [s].
+        clock: Tells the time [s]. What it raises is only kept in `untimed`.
         keep: How many transitions `log` keeps; the oldest are dropped, `count` goes on.
         on_transition: Called with every transition, e.g. to print it. What it raises is only kept in `unheard`.
 
@@ -133,6 +142,7 @@ class Supervisor:
         log: The last transitions.
         count: How many there have been.
         unheard: The last exception of `on_transition`, in words; empty without one.
+        untimed: Why the clock told no time, the last time that it did not, in words; empty if it always did.
 
     Raises:
         ConfigurationError: `clock` or `on_transition` cannot be called, or `keep` is no whole number >= 0.
@@ -154,7 +164,7 @@ class Supervisor:
         self.causes: tuple[str, ...] = ()
         self.log: deque[Transition] = deque(maxlen=keep)
         self.count = 0
-        self.unheard = ""
+        self.unheard = self.untimed = ""
 
     @property
     def moving(self) -> bool:
@@ -182,8 +192,17 @@ class Supervisor:
         return self._handle(Event.DEGRADE, cause)
 
     def stop(self, category: StopCategory, cause: str) -> bool:
-        """Stop; a stop in progress only becomes graver."""
-        category = StopCategory(category)
+        """Stop; a stop in progress only becomes graver.
+
+        Args:
+            category: How; what is none counts as category 0, since nothing graver can have been meant, and is said.
+            cause: Why.
+        """
+        try:
+            category = StopCategory(category)
+        except Exception:  # of a stranger's own __eq__ or __hash__ as well
+            cause = f"{cause_in_words(cause)} (with {represented(category)} for a stop category: taken for 0)"
+            category = StopCategory.IMMEDIATE
         return self._handle(Event.CUT if category is StopCategory.IMMEDIATE else Event.STOP, cause, category)
 
     def standstill(self, cause: str) -> bool:
@@ -198,7 +217,7 @@ class Supervisor:
         return self._handle(Event.ACKNOWLEDGE, cause)
 
     def _handle(self, event: Event, cause: str, category: StopCategory | None = None) -> bool:
-        before = self.state
+        before, cause = self.state, cause_in_words(cause)
         after = TRANSITIONS.get((before, event), before)
         graver = category is not None and (self.category is None or category < self.category)
         bad = event in (Event.DEGRADE, Event.STOP, Event.CUT)
@@ -207,6 +226,7 @@ class Supervisor:
             cause, news = _MORE, _MORE not in self.causes
         if after is before and not graver and not (news and before.severity >= DEGRADED.severity):
             return False
+        now = self._time()
         if event is Event.ACKNOWLEDGE:
             self.causes, self.category = (), None
         elif bad and not self._known(cause):
@@ -215,7 +235,7 @@ class Supervisor:
             self.category = category
         self.state = after
         self.count += 1
-        transition = Transition(self._clock(), before, after, event, self.category, cause)
+        transition = Transition(now, before, after, event, self.category, cause)
         self.log.append(transition)
         if self._on_transition is not None:
             try:
@@ -223,6 +243,13 @@ class Supervisor:
             except Exception as error:  # of the user's; the loop must go on
                 self.unheard = type(error).__name__
         return True
+
+    def _time(self) -> float:
+        try:
+            return float(self._clock())
+        except Exception as error:  # of the user's, or it tells no number; what happened counts all the same
+            self.untimed = in_words(error)
+            return math.nan
 
     def _known(self, cause: str) -> bool:
         return cause in self.causes or _FIGURE.sub("#", cause) in {_FIGURE.sub("#", known) for known in self.causes}

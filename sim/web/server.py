@@ -14,13 +14,14 @@ from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from io import StringIO
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
 
 HOST, PORT = "127.0.0.1", 8080
 COOKIE = "qpsafe_token"
 LOCAL = ("127.0.0.1", "localhost", "::1")
+LONGEST = 2000  # characters of a token in an address: what every browser takes, in an address and in a cookie
 NO_VISER = "a page in the browser needs viser: pip install 'qpsafe[web]'"
 
 
@@ -67,14 +68,40 @@ def address_of(host: str, port: int, token: str = "") -> str:
         host: Served at.
         port: Likewise.
         token: That the page asks for.
+
+    Raises:
+        ConfigurationError: No address can have that token.
     """
     shown = f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+    return f"http://{shown}:{port}/" + (f"?token={_quoted(token)}" if token else "")
 
 
 def token_for(host: str, token: str | None) -> str:
-    """The token that a page asks for: none on this computer alone, else the given one, or a new one."""
-    return token or ("" if host in LOCAL else secrets.token_urlsafe(16))
+    """The token that a page asks for: none on this computer alone, else the given one, or a new one.
+
+    Args:
+        host: Served at.
+        token: As given.
+
+    Raises:
+        ConfigurationError: It is empty, or no address can have it.
+    """
+    if token is None:
+        return "" if host in LOCAL else secrets.token_urlsafe(16)
+    _quoted(token)
+    return token
+
+
+def _quoted(token: str) -> str:
+    """A token as an address and a cookie can have it: letters, digits, and what is never special there."""
+    try:
+        found = quote(token, safe="")
+    except (TypeError, UnicodeEncodeError):  # bytes of the command line that are no text
+        found = ""
+    if not isinstance(token, str) or not 0 < len(found) <= LONGEST:
+        expected = f"text for an address, at most {LONGEST} characters when written there"
+        raise ConfigurationError("page", "token", token, expected)
+    return found
 
 
 class Page:
@@ -91,12 +118,13 @@ class Page:
         address: To open in a browser, with the token.
 
     Raises:
-        ConfigurationError: The port is taken.
+        ConfigurationError: The port is taken, or no address can have the token.
         MissingExtraError: Viser is not installed.
     """
 
     def __init__(self, host: str, port: int, title: str, token: str = "") -> None:
         viser = need_viser()
+        address_of(host, port, token)  # raises
         check_port(host, port)
         logging.getLogger("websockets").setLevel(logging.CRITICAL)  # whoever knocks and goes away is no news
         with guarded(token), redirect_stdout(StringIO()), warnings.catch_warnings():
@@ -170,14 +198,14 @@ def _gatekeeper(token: str, inner: Callable[..., Any] | None) -> Callable[..., A
             return connection.respond(HTTPStatus.FORBIDDEN, "the address needs the token that was printed with it\n")
         response = None if inner is None else inner(connection, request)
         if response is not None and given:
-            response.headers["Set-Cookie"] = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+            response.headers["Set-Cookie"] = f"{COOKIE}={_quoted(token)}; HttpOnly; SameSite=Strict; Path=/"
         return response
 
     return look
 
 
 def _same(one: str, other: str) -> bool:
-    return hmac.compare_digest(one.encode(), other.encode())
+    return hmac.compare_digest(*(each.encode("utf-8", "surrogatepass") for each in (one, other)))
 
 
 def _cookie(request: Any) -> str:
@@ -185,4 +213,4 @@ def _cookie(request: Any) -> str:
         found = SimpleCookie(request.headers.get("Cookie", ""))
     except CookieError:
         return ""
-    return found[COOKIE].value if COOKIE in found else ""
+    return unquote(found[COOKIE].value) if COOKIE in found else ""

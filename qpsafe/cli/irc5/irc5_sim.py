@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import RobotName, SensorName, console, load_named, print_json, write_text
+from qpsafe.cli.irc5.idle import SIMULATED, refuse_unused
 from qpsafe.cli.irc5.stream import Experiment
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
@@ -27,6 +28,7 @@ WHERE = "qpsafe irc5-sim"
 
 
 def irc5_sim(
+    context: typer.Context,
     experiment: Annotated[
         Experiment, typer.Option(help="Experiment that is played around the robot.")
     ] = Experiment.fixed,
@@ -90,6 +92,8 @@ def irc5_sim(
 
     Faults are counted from the first answer. Distances of the simulated spots are sent along.
     """
+    bad = span("--faulty", faulty)
+    refuse_unused(context, SIMULATED)
     screen = console(json)
     screen.print("Loading ...", style="dim")
     from qpsafe.irc5.process import realtime
@@ -123,7 +127,7 @@ def irc5_sim(
         [span("--motors-off", text) for text in motors_off or ()],
         [span("--rapid-stop", text) for text in rapid_stop or ()],
         faults,
-        span("--faulty", faulty),
+        bad,
         wrong_sender,
     )
     if lockstep and todo:

@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 import typer
 
 from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json, refuse_idle
+from qpsafe.cli.irc5.idle import BLIND, STREAM, refuse_unused
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
@@ -107,6 +108,7 @@ def stream(
     No safety function: keep the robot's own stops and limits independent of this program. SIGUSR1 acknowledges a stop.
     """
     refuse_idle(context, "web")
+    refuse_unused(context, STREAM)
     from qpsafe.irc5.process import realtime
     from qpsafe.irc5.process.outlet import Outlet
     from qpsafe.irc5.process.requests import Requests
@@ -136,6 +138,7 @@ def stream(
         checked = _Checked(unchecked, sensors, screen)
         controller = _controller(robot, program, cell, experiment, make_law(law, projection), checked)
         blind = not sensors or controller.sensing is None
+        refuse_unused(context, BLIND if blind else ())
         writer = None if log is None else _writer(log, controller.robot.nq)
         if writer is not None:
             stack.enter_context(writer)

@@ -41,7 +41,7 @@ def result_of(
     """
     counts, supervisor = streamer.counts, loop.supervisor
     late = run.latency.above(PERIOD)
-    lost = counts["missed"] + counts["superseded"]
+    lost = counts["missed"] + counts["superseded"] + counts["late"]
     asked = dog is not None and dog.asked > 0.0
     return {
         "good": run.good,
@@ -57,6 +57,7 @@ def result_of(
             "answered after 4 ms": late,
             "superseded by a newer packet": counts["superseded"],
             "lost before": counts["missed"],
+            "too old when read": counts["late"],
         },
         "response": run.latency.summary(),
         "histogram": dict(run.latency.decades()),

@@ -1,7 +1,8 @@
 """Logs of joint references: one CSV for people, one compact binary for machines, both read back equal.
 
 A log is written record by record into `<name>.part`, which becomes `<name>` when it is closed: under its own name it is
-whole or not there. After a crash, all records that reached the disk are read from the `.part` file.
+whole or not there. After a crash, all records that reached the disk are read from the `.part` file. Where nothing was
+recorded there is no log, and an older one of that name stays.
 """
 
 from __future__ import annotations
@@ -91,10 +92,16 @@ class ReferenceWriter:
         return "" if self._outlet is None else self._outlet.trouble(now)
 
     def close(self) -> None:
-        """Finish the log and give it its name, if all of it is there; nothing if that was done."""
+        """Finish the log and give it its name, if all of it is there; nothing if that was done.
+
+        Of a log without a reference nothing is left.
+        """
         if not self._file.closed and self._end():
             try:
-                os.replace(self.part, self.path)
+                if self.count:
+                    os.replace(self.part, self.path)
+                else:
+                    self.part.unlink(missing_ok=True)
             except OSError as error:
                 if self._outlet is None:
                     raise
@@ -128,7 +135,7 @@ class ReferenceWriter:
             self.close()
         elif not self._file.closed:  # what is there stays readable, under the name of a log that was not finished
             with suppress(OSError):
-                self._end()
+                (self._end if self.count else self.close)()
 
 
 def write_references(path: str | Path, references: Iterable[JointReference]) -> None:

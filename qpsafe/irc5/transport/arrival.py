@@ -48,10 +48,13 @@ class Waits:
 
     Args:
         entrance: The socket, before anything can come.
+
+    Attributes:
+        stamped: Whether the kernel says when datagrams arrive.
     """
 
     def __init__(self, entrance: socket.socket) -> None:
-        ask_for_times(entrance)
+        self.stamped = ask_for_times(entrance)
         self._now = self._empty = time.monotonic_ns()
         self._ahead = self._most_ahead = time.time_ns() - self._now  # of the real-time clock [ns]
 

@@ -17,8 +17,10 @@ from hypothesis import strategies as st
 
 from qpsafe.irc5 import run as run_module
 from qpsafe.irc5.distances import NEW, SensorInput, SensorOutput
+from qpsafe.irc5.loop import StreamLoop
 from qpsafe.irc5.process.requests import Requests
 from qpsafe.irc5.run import WAIT, run_stream
+from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.transport import arrival
 from qpsafe.irc5.transport.arrival import Waits
 from qpsafe.sensing.rules import SensingRules
@@ -172,15 +174,16 @@ def test_a_clock_that_is_set_while_a_datagram_waits_hides_nothing(sensors: Senso
     assert (ages < 60.0).all()
 
 
-class Silent:
+class Silent(EgmStreamer, StreamLoop):
     """A robot that does not speak: what `run_stream` has of a streamer, a loop and its supervisor."""
+
+    leaving = False
 
     def __init__(self, requests: Requests, end: float) -> None:
         self.requests, self.end = requests, end
         self.rules = types.SimpleNamespace(silence=0.1)
         self.session = types.SimpleNamespace(at_rest=True)
         self.supervisor = types.SimpleNamespace(state=run_module.State.STOPPED)
-        self.leaving = False
 
     def wait(self, timeout: float) -> None:
         assert timeout == WAIT
@@ -208,7 +211,7 @@ def test_the_sensors_are_listened_to_while_no_robot_speaks(sensors: Sensors) -> 
     speaker = threading.Thread(target=speak)
     speaker.start()
     try:
-        run = run_stream(robot, robot, sensors=sensors.entrance, requests=requests)  # type: ignore[arg-type]
+        run = run_stream(robot, robot, sensors=sensors.entrance, requests=requests)
         newest = sent[-1]
     finally:
         over.set()

@@ -1,7 +1,9 @@
 """Distances over UDP: what is sent is read, junk and strangers change nothing."""
 
+import select
 import socket
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.distances import Distances, SensorInput, SensorOutput, decode, encode
+from qpsafe.irc5.distances import MOST_AGED, MOST_SPOTS, Distances, SensorInput, SensorOutput, decode, encode
 from qpsafe.sensing.rules import SensingRules
 
 VALUES = st.integers(0, 30).flatmap(lambda k: arrays(np.float64, k))  # NaN and infinities too
@@ -27,6 +29,32 @@ def test_round_trip_to_the_bit(values: np.ndarray, aged: bool, seq: int, time: f
     assert found.values.tobytes() == values.tobytes()
     assert (found.ages is not None) == aged
     assert found.ages is None or found.ages.tobytes() == values[::-1].tobytes()
+
+
+COUNTS = st.integers(0, 70_000) | st.sampled_from([MOST_SPOTS, MOST_SPOTS + 1, MOST_AGED, MOST_AGED + 1])
+SHAPES = st.tuples(COUNTS) | st.tuples(st.integers(0, 30)) | st.sampled_from([(), (20, 2), (2, 20), (20, 1), (1, 20)])
+
+
+@settings(max_examples=some(60, of=500), deadline=None)
+@given(SHAPES, st.none() | SHAPES | st.just("the same"))
+def test_what_can_be_sent_can_be_read_and_all_else_is_refused_by_name(shape: Any, aged: Any) -> None:
+    aged = shape if aged == "the same" else aged
+    reader = SensorInput(min(shape[0], MOST_SPOTS) if shape else 1, port=0)
+    writer = SensorOutput(*reader.address)
+    values, ages = np.zeros(shape), None if aged is None else np.zeros(aged)
+    fits = len(shape) == 1 and shape[0] <= (MOST_SPOTS if aged is None else MOST_AGED)
+    try:
+        if fits and aged in (None, shape):
+            writer.send(values, ages)
+            select.select([reader._socket], [], [], 5.0)
+            assert np.isfinite(reader.read()[1]).all()
+            assert reader.counts.used == 1
+        else:
+            with pytest.raises(ConfigurationError, match=f"^distances: {'ages' if fits else 'values'} = "):
+                writer.send(values, ages)
+    finally:
+        reader.close()
+        writer.close()
 
 
 @settings(max_examples=some(100, of=300))

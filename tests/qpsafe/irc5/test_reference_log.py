@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import struct
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import amounts
@@ -113,6 +114,23 @@ def test_a_log_has_its_name_only_when_it_is_whole(ending: str, tmp_path: Path) -
         assert writer.count == len(log)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     assert read_references(path).references == log
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("old", [None, b"whatever was there"])
+@pytest.mark.parametrize("fails", [False, True])
+def test_where_nothing_was_recorded_an_older_file_stays_and_none_is_made(
+    old: bytes | None, ending: str, beside: bool, fails: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / f"log{ending}"
+    if old is not None:
+        path.write_bytes(old)
+    with suppress(InterruptedError), ReferenceWriter(path, 6, beside=beside):
+        if fails:
+            raise InterruptedError
+    assert [p.name for p in tmp_path.iterdir()] == ([] if old is None else [path.name])
+    assert old is None or path.read_bytes() == old
 
 
 def interrupt(path: Path) -> None:

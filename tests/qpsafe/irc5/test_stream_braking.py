@@ -24,6 +24,7 @@ from qpsafe.irc5.process.requests import LEAVE, Requests
 from qpsafe.irc5.rules import SessionRules
 from qpsafe.irc5.run import CHECK, GONE, StreamRun, run_stream
 from qpsafe.irc5.session import Cycle, EgmSession
+from qpsafe.irc5.streamer import EgmStreamer
 from qpsafe.irc5.supervisor import State, Supervisor, Transition
 from qpsafe.limits import JointLimits
 from qpsafe.reference import JointReference
@@ -65,7 +66,7 @@ class Swaying:
         )
 
 
-class Stage:
+class Stage(EgmStreamer):
     """`run_stream`'s streamer, clock and robot; `deeds` are done at the beginning of their cycles."""
 
     def __init__(
@@ -123,7 +124,7 @@ class Stage:
         return True
 
     def run(self, **named: object) -> StreamRun:
-        return run_stream(self, self.loop, clock=lambda: self.now, **named)  # type: ignore[arg-type]
+        return run_stream(self, self.loop, **({"clock": lambda: self.now} | named))  # type: ignore[arg-type]
 
     def check_braked(self, from_cycle: int, settled: bool = True) -> None:
         """From a cycle on: never beyond the joints' limits, at rest at the end, and that was sent for a while."""

@@ -1,8 +1,11 @@
 """The supervisor only escalates until acknowledged, and says why; its diagram in the docs is its table."""
 
+import math
 import re
 from pathlib import Path
+from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 from amounts import some
 from hypothesis import given, settings
@@ -189,9 +192,76 @@ def test_whatever_listening_raises_the_supervisor_goes_on() -> None:
     assert supervisor.unheard == "OSError"
 
 
-def test_a_wrong_category_is_refused() -> None:
-    with pytest.raises(ValueError, match="3"):
-        Supervisor().stop(3, "no such category")  # type: ignore[arg-type]
+class Hostile:
+    """Whatever is asked of it, it raises."""
+
+    def _fail(self, *_: object) -> NoReturn:
+        raise RuntimeError("not this one")
+
+    __repr__ = __str__ = __eq__ = __hash__ = __bool__ = __float__ = __len__ = _fail  # type: ignore[assignment]
+
+
+ODD = st.one_of(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary(),
+    st.lists(st.integers()) | st.dictionaries(st.text(), st.integers()),
+    st.builds(Hostile) | st.builds(object) | st.just(Hostile) | st.builds(ValueError, st.text()),
+    st.just(10**5000) | st.just(np.zeros(3)),
+)
+CLOCKS = st.sampled_from(["good", "raises"]) | ODD
+WAYS = st.sampled_from([method for method in vars(Supervisor) if not method.startswith("_")]).filter(
+    lambda name: callable(getattr(Supervisor, name))
+)
+
+
+@given(st.lists(st.tuples(WAYS, ODD, ODD | CATEGORIES, CLOCKS), min_size=1, max_size=12))
+@settings(max_examples=some(60, of=500))
+def test_nothing_that_is_given_in_the_loop_raises_or_leaves_a_change_unsaid(
+    calls: list[tuple[str, Any, Any, Any]],
+) -> None:
+    """Causes, categories and times of any type: what changes is in the log, in words, at NaN where there is no time."""
+    told: Any = "good"
+
+    def clock() -> Any:
+        if isinstance(told, str) and told == "raises":
+            raise ZeroDivisionError("no time")
+        return 1.0 if isinstance(told, str) and told == "good" else told
+
+    supervisor = Supervisor(clock)
+    for name, cause, category, told in calls:
+        before, count = supervisor.state, supervisor.count
+        changed = getattr(supervisor, name)(*([category] if name == "stop" else []), cause)
+        assert supervisor.count == count + changed
+        assert changed or supervisor.state is before
+        if not changed:
+            continue
+        last = supervisor.log[-1]
+        assert (last.before, last.after) == (before, supervisor.state)
+        assert isinstance(last.time, float)
+        assert isinstance(last.cause, str)
+        assert last.cause
+        assert str(last)
+        assert math.isfinite(last.time) or supervisor.untimed or isinstance(told, float)
+        if name == "stop" and not (isinstance(category, int | float) and category in (0, 1, 2)):
+            assert supervisor.category is StopCategory.IMMEDIATE
+            assert "for a stop category: taken for 0" in last.cause
+
+
+@pytest.mark.parametrize("category", [7, -1, "1", None, math.nan, [1], Hostile(), Hostile])
+def test_a_category_that_is_none_stops_as_the_gravest_and_is_said(category: Any) -> None:
+    supervisor = Supervisor()
+    supervisor.seed("ready")
+    assert supervisor.stop(category, "in a hurry")
+    assert (supervisor.state, supervisor.category) == (State.STOPPED, StopCategory.IMMEDIATE)
+    (cause,) = supervisor.causes
+    assert cause.startswith("in a hurry (with ")
+
+
+def test_a_clock_that_fails_is_said_and_the_transition_is_logged() -> None:
+    supervisor = Supervisor(lambda: 1 / 0)
+    assert supervisor.seed("ready")
+    assert math.isnan(supervisor.log[-1].time)
+    assert supervisor.untimed == "ZeroDivisionError: division by zero"
+    assert "idle -> seeding: ready" in str(supervisor.log[-1])
 
 
 def test_the_pages_table_is_that_of_the_code() -> None:

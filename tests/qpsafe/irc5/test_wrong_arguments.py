@@ -5,9 +5,11 @@ One table of all constructors and their arguments, by what each takes, and one o
 
 from __future__ import annotations
 
+import inspect
 import math
 import types
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ import pytest
 from egm_wire import LIMITS, N
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.irc5.distances import SensorInput, SensorOutput
+from qpsafe.irc5.distances import MOST_AGED, MOST_SPOTS, Distances, SensorInput, SensorOutput, encode
 from qpsafe.irc5.loop import LoopRules, StreamLoop
 from qpsafe.irc5.messages import RobotPacket, decode_robot, decode_sensor, encode_robot
 from qpsafe.irc5.process.outlet import Outlet
@@ -55,6 +57,8 @@ NO_FLAG: list[Any] = ["no", "", 0, 1, 1.0, None, [], object(), Hostile()]
 NO_OBJECT: list[Any] = ["a", 5, 1.5, True, [1], {}, object(), Hostile()]
 NO_PLACES: list[Any] = ["a", 5, [1.5], [True], ["0"], [0, 0], [-1], [N], [None], object(), Hostile()]
 NO_JOINTS: list[Any] = ["a", 5, ["1"] * N, [True] * N, [1j] * N, np.zeros((N, 1)), Hostile()]
+NO_ROW: list[Any] = ["a", 5, ["1"] * 3, [None] * 3, [1j] * 3, [[0.0], [0.0, 1.0]], np.zeros((3, 2)), Hostile()]
+NO_ROW += [np.ma.masked_array(np.zeros(3), [True, False, False]), [True] * 3, {}, object()]
 NO_NUMBERS = [*NO_JOINTS, [None] * N, [math.nan] * N, [[1.0], [1.0, 2.0]]]
 
 
@@ -69,6 +73,24 @@ def packet(**changes: Any) -> bytes:
 def looped(**changes: Any) -> StreamLoop:
     controller = types.SimpleNamespace(robot=types.SimpleNamespace(sliding=np.zeros(N, bool)), step=len)
     return StreamLoop(**({"controller": controller, "session": EgmSession(LIMITS)} | changes))
+
+
+def streamed(**changes: Any) -> None:
+    with closing(EgmStreamer(LIMITS, port=0)) as streamer:
+        run_stream(**({"streamer": streamer, "loop": looped(session=streamer.session)} | changes))
+
+
+def sent(**changes: Any) -> None:
+    with closing(SensorOutput()) as output:
+        output.send(**({"values": np.zeros(3)} | changes))
+
+
+def encoded(**changes: Any) -> bytes:
+    return encode(Distances(**({"seq": 0, "time": 0.0, "values": np.zeros(3)} | changes)))
+
+
+def broken() -> float:
+    raise RuntimeError("no time")
 
 
 def written(**changes: Any) -> ReferenceWriter:
@@ -192,9 +214,25 @@ WRONG: list[tuple[Callable[..., Any], dict[str, Any], dict[str, list[Any]]]] = [
     (decode_robot, {"data": b""}, {"n": none_too(NO_COUNT)}),
     (decode_sensor, {"data": b""}, {"n": none_too(NO_COUNT)}),
     (
-        run_stream,
-        {"streamer": None, "loop": None},
+        sent,
+        {},
         {
+            "values": none_too([*NO_ROW, np.zeros(MOST_SPOTS + 1), np.zeros(70_000)]),
+            "ages": [*NO_ROW, np.zeros(2), np.zeros(4), []],
+        },
+    ),
+    (sent, {"ages": np.zeros(MOST_AGED + 1)}, {"values": [np.zeros(MOST_AGED + 1)]}),
+    (encoded, {}, {"seq": none_too(NO_WHOLE), "time": none_too([*NO_NUMBER, math.inf, 1e300])}),
+    (
+        streamed,
+        {},
+        {
+            "streamer": none_too(NO_OBJECT),
+            "loop": none_too([*NO_OBJECT, looped()]),
+            "watchdog": [*NO_OBJECT, Watchdog()],
+            "helpers": none_too(["a", 5, 1.5, True, [1], ["a"], [len, None], {"a": 1}, object(), Hostile()]),
+            "requests": NO_OBJECT,
+            "clock": none_too([*NO_OBJECT, lambda: "noon", lambda: None, lambda: math.nan, broken]),
             "sensors": NO_OBJECT,
             "duration": [*NO_NUMBER, -1.0, math.inf],
             "patience": none_too([*NO_TIME]),
@@ -212,6 +250,9 @@ NAMES = {
     "written": "reference log",
     "read_references": "reference log",
     "write_references": "reference log",
+    "streamed": "run_stream",
+    "sent": "distances",
+    "encoded": "distances",
 }
 KEYS = {"where": "HOST:PORT"}
 PASSED_ON = {"rules", "joint_names", "axes", "limits"}  # by the streamer to its session
@@ -244,6 +285,8 @@ def test_every_argument_of_these_has_been_tried() -> None:
     """But functions that only the tests of others give, and what is no argument of a user."""
     for make, _, wrong in WRONG:
         names = list(wrong)
+        if make is streamed:
+            assert sorted(names) == sorted(inspect.signature(run_stream).parameters)
         if make in (SensorInput, SensorOutput, LoopRules, SessionRules, EgmSession, EgmStreamer, Supervisor, Watchdog):
             code = make.__init__.__code__  # type: ignore[misc]
             taken = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]

@@ -6,15 +6,23 @@ import builtins
 import http.client
 import socket
 from collections.abc import Iterator
+from http import HTTPStatus
 from typing import Any
+from urllib.parse import quote
 
 import pytest
+from amounts import some
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from qpsafe.cli.main import app
 from qpsafe.errors import ConfigurationError, MissingExtraError
-from qpsafe.sim.web.server import Page, check_port, need_viser, token_for
+from qpsafe.sim.web.server import LONGEST, Page, _gatekeeper, address_of, check_port, need_viser, token_for
 
-TOKEN = "let-me-in"
+TOKEN = 'let me&in+d#e;"ä中'
+QUOTED = quote(TOKEN, safe="")
 
 
 @pytest.fixture(scope="module")
@@ -60,19 +68,72 @@ def test_on_this_computer_the_page_is_open_but_not_to_other_sites(free: Page) ->
 
 def test_a_token_is_asked_for_and_remembered_by_a_cookie(guarded: Page) -> None:
     own = f"http://127.0.0.1:{guarded.server.get_port()}"
-    assert guarded.address == f"{own}/?token={TOKEN}"
+    assert guarded.address == f"{own}/?token={QUOTED}"
     assert ask(guarded).status == 403
     assert ask(guarded, "/?token=guess").status == 403
     assert upgrade(guarded, Origin=own) == 403
     assert upgrade(guarded, Origin=own, Cookie="qpsafe_token=guess") == 403
     assert upgrade(guarded, Origin=own, Cookie="qpsafe_token") == 403
-    answer = ask(guarded, f"/?token={TOKEN}")
+    answer = ask(guarded, f"/?token={QUOTED}")
     assert answer.status == 200
     cookie = answer.getheader("Set-Cookie") or ""
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
     assert upgrade(guarded, Origin=own, Cookie=cookie.partition(";")[0]) == 101
     assert upgrade(guarded, Origin="http://example.org", Cookie=cookie.partition(";")[0]) == 403
+
+
+ODD_TOKENS = st.text(st.characters(), min_size=1) | st.text(" &=+#%?/\\;,\"'<>[]äß中\0\n", min_size=1)
+
+
+@settings(max_examples=some(20, of=300), deadline=None)
+@given(ODD_TOKENS | st.sampled_from(["a b&c+d#e", "%41", "x" * LONGEST, "x" * (LONGEST + 1), "中" * 1000, "\udcff"]))
+def test_whatever_the_token_the_printed_address_and_its_cookie_open_the_page_or_it_is_refused(token: str) -> None:
+    """Asked as a server would be: what it is told is a line of ASCII, parsed by the library that serves."""
+    if len(token.encode("utf-8", "surrogatepass")) * 3 > LONGEST or not token.isprintable():
+        try:
+            token_for("127.0.0.1", token)
+        except ConfigurationError:
+            return
+    address = address_of("127.0.0.1", 8080, token_for("127.0.0.1", token))
+    assert address.isascii()
+    assert all(letter.isprintable() and letter != " " for letter in address)
+    path = address.removeprefix("http://127.0.0.1:8080")
+    assert asked(token, path) == 200
+    assert asked(token, "/", f"other=1; {cookie_of(token, path)}") == 200
+    assert asked(token, "/") == asked(token, path + "x") == asked(token, "/?token=\udcff%ff") == 403
+    assert asked(token, "/", cookie_of(token, path) + "x") == 403
+
+
+def look(token: str, path: str, cookie: str = "") -> Any:
+    """What the gatekeeper answers to a request."""
+    request = Request(path, Headers(Host="127.0.0.1:8080", **({"Cookie": cookie} if cookie else {})))
+    return _gatekeeper(token, lambda *_: Response(200, "OK", Headers()))(ServerProtocolLike(), request)
+
+
+def asked(token: str, path: str, cookie: str = "") -> int:
+    return look(token, path, cookie).status_code
+
+
+def cookie_of(token: str, path: str) -> str:
+    return look(token, path).headers["Set-Cookie"].partition(";")[0]
+
+
+class ServerProtocolLike:
+    """A connection, as far as it is asked."""
+
+    def respond(self, status: HTTPStatus, text: str) -> Response:
+        return Response(status.value, text, Headers())
+
+
+@pytest.mark.parametrize("token", ["", "\udcff", "x" * (LONGEST + 1), 5, b"abc"])
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_a_token_that_no_address_can_have_is_refused_by_name(token: Any, host: str) -> None:
+    with pytest.raises(ConfigurationError, match="page: token = "):
+        token_for(host, token)
+    if token:
+        with pytest.raises(ConfigurationError, match="page: token = "):
+            Page(host, 0, "test", token)
 
 
 def test_a_token_is_made_up_for_every_address_but_this_computers() -> None:
