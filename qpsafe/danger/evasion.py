@@ -93,6 +93,8 @@ def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
 PAPER_MASS, PAPER_DAMPING = 4.0, 20.0
 #: The rule of `Evasion.for_robot`: shares of a joint's largest speed and of the time in which it gets there.
 SPEED_SHARE, TIME_SHARE = 0.5, 0.3
+#: How many times the damping of the joint that moves the wire fastest a joint may need and still share one D with it.
+SLOW = 2.0
 MOST_JOINTS = 1000  # a robot can have; beyond it matrices do not fit anywhere
 CONFIGURATIONS = 32  # that a robot's levers are looked for in
 
@@ -159,11 +161,17 @@ class Evasion:
         time v_j/a_j that a joint needs to its largest speed: the filter smooths, the acceleration limits set the pace.
         M = 4, D = 20 of the first experiment are what s = 1/4, b = 0.6 give on the IRB 140; its own are 1 and 10.
 
-        Stability: moving away reduces the force, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive: a point at rest is
-        evaded without a cycle whatever K is. A delay T takes phase from that: where the loop's gain K/(ω |M jω + D|) is
-        1, it needs ω T + atan(ω M/D) < π/2. At the distance d a danger Δ falls as Δ/d, so K <= Δ Σ_j ℓ_j²/(2 d), with
-        all joints at their longest levers. For the IRB 140 at 0.3 m K/D <= 11 rad/s, the gain is 1 at 8 rad/s, and
-        T = 0.02 s, M/D = 0.1 s take 9° and 39° of 90°.
+        A slow axis, as a rail or a lift under the arm, must not make all joints as slow: the maximum is over those that
+        need at most `SLOW` times the D of the joint that moves the wire fastest, at ℓ_j v_j; half of that if it slides:
+        it moves all links whole, but one way only. The others, of which the bundled robots have none, have the larger
+        D_j = Δ ℓ_j/(s v_j) that they need, and M_j = D_j b v_j/a_j.
+
+        Stability: moving away reduces the force, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive for whatever positive
+        M and D, also diagonal ones: a point at rest is evaded without a cycle whatever K is. A delay T takes phase from
+        that: where the loop's gain K/(ω |M jω + D|) is 1, it needs ω T + atan(ω M/D) < π/2, with diagonal ones for the
+        largest M_j/D_j; a larger D_j of some joints only lowers the gain, as D^-½ K D^-½ falls. At the distance d a
+        danger Δ falls as Δ/d, so K <= Δ Σ_j ℓ_j²/(2 d), with all joints at their longest levers. For the IRB 140 at
+        0.3 m K/D <= 11 rad/s, the gain is 1 at 8 rad/s, and T = 0.02 s, M/D = 0.1 s take 9° and 39° of 90°.
 
         Args:
             robot: The robot.
@@ -173,8 +181,11 @@ class Evasion:
 
         if robot.tuned.evasion is not None:
             return cls(*robot.tuned.evasion, robot.nq, dt)
-        torque = robot_thresholds(robot)[0].start * levers(robot)
-        damping = float((torque / (SPEED_SHARE * robot.max_velocity)).max())
+        lever = levers(robot)
+        needed = robot_thresholds(robot)[0].start * lever / (SPEED_SHARE * robot.max_velocity)
+        speed = lever * robot.max_velocity * np.where(robot.sliding, 0.5, 1.0)
+        common = needed <= SLOW * needed[int(np.argmax(speed))]
+        damping = np.where(common, needed[common].max(), needed)
         mass = damping * TIME_SHARE * robot.max_velocity / robot.max_acceleration
         return cls(mass, damping, robot.nq, dt)
 

@@ -17,6 +17,12 @@ def _writer(name: str) -> Any:
 
 
 @pytest.fixture(scope="session")
+def arm_writer() -> Any:
+    """`arm_writer.Writer`."""
+    return _writer("arm_writer")
+
+
+@pytest.fixture(scope="session")
 def mjcf_writer() -> Any:
     """`mjcf_writer.Writer`."""
     return _writer("mjcf_writer")

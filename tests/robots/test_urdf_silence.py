@@ -11,11 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qpsafe.errors import RobotFileError
+from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.robot.loader import load_robot
 from qpsafe.robot.models.urdf import UrdfFile
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.robot_file.starting_file import starting_robot_toml
+from qpsafe.sensing.hulls import Obstacle
 
 INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
 LINK = '<inertial><mass value="2"/>' + INERTIA + "</inertial>{}"
@@ -199,6 +200,8 @@ def test_a_collada_mesh_has_its_unit_and_is_not_turned(metres: float | None, axi
     robot = collada(tmp_path, f"<asset><contributor/>{unit}{axis}</asset>", scale="2 1 1")
     ((*_, points),) = robot.hulls()
     np.testing.assert_allclose(np.ptp(points, axis=0), np.array([2.0, 2.0, 3.0]) * (metres or 1.0), rtol=1e-6)
+    known = Obstacle.mesh("part", tmp_path / "part.DAE", scale=2.0)
+    np.testing.assert_allclose(np.ptp(known.vertices, axis=0), np.array([2.0, 4.0, 6.0]) * (metres or 1.0), rtol=1e-6)
     said = " ".join(note for note in robot.notes if "part.DAE" in note)
     assert ("part.DAE (Y_UP)" in said or "part.DAE (X_UP)" in said) == (axis[9:10] in ("X", "Y"))
     assert ("unit" in said) == (metres not in (None, 1.0))
@@ -213,6 +216,8 @@ def test_a_collada_mesh_without_a_head_is_in_metres(tmp_path: Path) -> None:
 def test_a_collada_mesh_with_a_unit_that_is_none_is_refused_by_name(metres: str, tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match=r"link fore: collision mesh: part\.DAE: unit meter"):
         collada(tmp_path, f'<asset><unit meter="{metres}"/></asset>')
+    with pytest.raises(ConfigurationError, match=r"obstacle thing: path: part\.DAE: unit meter"):
+        Obstacle.mesh("thing", tmp_path / "part.DAE")
 
 
 FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])

@@ -11,8 +11,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import RobotFileError
-from qpsafe.robot.models.model_file import ModelFile
-from qpsafe.robot.robot_file.spec import RobotSpec
+from qpsafe.robot.models.model_file import ModelFile, is_urdf
+from qpsafe.robot.robot_file.spec import WORLD, RobotSpec
 
 #: Full speed is reached in this time where no acceleration is stated [s]; neither MJCF nor URDF can state one.
 FULL_SPEED_TIME = 0.25
@@ -22,16 +22,18 @@ DEFAULT_MAX_VELOCITY = 1.0
 DEFAULT_MAX_SPEED = 0.25
 #: How the note of a robot begins whose file states no home pose.
 HOMELESS = "no home pose is stated"
+#: How far from the world's origin a joint that stands on the world itself is reported [m].
+FAR_FROM_ORIGIN = 1.0
 _NO_LIMIT = 1e6  # readers write huge numbers, or zero, for "no limit"
 
 
 def spec_from_model(path: Path, file: ModelFile, given: dict[str, ArrayLike]) -> RobotSpec:
     """Describe a robot from its model file alone.
 
-    Frames are all frames of the model. The wire follows the joint tree: a link from each joint's origin to the next
-    ones, and from every last joint to the frame farthest from it. Where the file states no speed, 1 rad/s or 0.25 m/s
-    is taken; accelerations reach full speed in 0.25 s; home is the keyframe "home" of an MJCF, else zero, moved inside
-    the limits.
+    Frames are all frames of the model. The wire follows the joint tree: a link from what the first joint stands on,
+    from each joint's origin to the next ones, and from every last joint to the frame farthest from it. Where the file
+    states no speed, 1 rad/s or 0.25 m/s is taken; accelerations reach full speed in 0.25 s; home is the keyframe "home"
+    of an MJCF, else zero, moved inside the limits.
 
     Args:
         path: The model file.
@@ -71,6 +73,8 @@ def spec_from_model(path: Path, file: ModelFile, given: dict[str, ArrayLike]) ->
             raise RobotFileError(path, f"{name}.home", float(value), f"within {low:g} to {high:g} rad")
     if "home" not in given and not file.home:
         notes.append(f"{HOMELESS}: all joints at zero, moved inside their limits")
+    wire = wire_from_tree(model, _roots_of_urdf(model) if is_urdf(path) else file.roots)
+    notes += _said_of_origin(model)
     return RobotSpec(
         name=model.name or path.stem,
         title=model.name or path.stem,
@@ -79,7 +83,7 @@ def spec_from_model(path: Path, file: ModelFile, given: dict[str, ArrayLike]) ->
         joint_names=names,
         home=home,
         frames={frame.name: frame.name for frame in model.frames},
-        wire_frames=wire_from_tree(model, file.roots),
+        wire_frames=wire,
         notes=tuple(notes),
         lower=values["lower"],
         upper=values["upper"],
@@ -116,6 +120,38 @@ def wire_from_tree(model: Any, roots: Mapping[str, str]) -> tuple[tuple[str, str
         if tip is not None:
             links.append((origins[i].name, tip))
     return tuple(links)
+
+
+def _roots_of_urdf(model: Any) -> dict[str, str]:
+    """First joint -> the link it stands on, where that is off the origin; of an MJCF `ModelFile.roots` says the same.
+
+    Between the world's origin and that link nothing of the robot need stand.
+    """
+    roots = {}
+    for joint, link in _first_joints(model):
+        if np.linalg.norm(link.placement.translation) > 1e-9:
+            roots[model.names[joint]] = link.name
+    return roots
+
+
+def _said_of_origin(model: Any) -> list[str]:
+    """Joints that stand on the world itself, far from its origin, where the wire begins for want of another frame."""
+    notes = []
+    for joint, link in _first_joints(model):
+        far = float(np.linalg.norm(model.jointPlacements[joint].translation))
+        if link.name in WORLD and far > FAR_FROM_ORIGIN:
+            name = model.names[joint]
+            notes.append(
+                f"{name} stands on no link or body that is fixed, so the wire begins {far:.3g} m away, at the world's "
+                f"origin: put one where {name} is, unless the robot's base reaches that far"
+            )
+    return notes
+
+
+def _first_joints(model: Any) -> list[tuple[int, Any]]:
+    """Joints that no other one moves, and the frames of what they stand on."""
+    frames = [frame for frame in model.frames if frame.type == pin.FrameType.JOINT]
+    return [(f.parentJoint, model.frames[f.parentFrame]) for f in frames if model.parents[f.parentJoint] == 0]
 
 
 def _check_limits(path: Path, names: tuple[str, ...], values: dict[str, NDArray[np.float64]]) -> None:

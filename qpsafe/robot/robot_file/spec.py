@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from qpsafe.robot.joint_choice import HeldJoint
 from qpsafe.robot.models.hulls import BodyHull
 
+#: What a robot stands in, not on: pinocchio's world, and by custom the link of a URDF that means it.
+WORLD = ("universe", "world")
+
 
 class Tool(NamedTuple):
     """The mounted tool.
