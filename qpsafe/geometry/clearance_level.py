@@ -29,6 +29,10 @@ class ClearanceLevel(Level):
 
     __slots__ = ("_names", "_pairs", "gaps")
 
+    gaps: Array
+    _names: tuple[str, ...]
+    _pairs: Index
+
     firm = True
 
     def __init__(self, A: Array, upper: Array, gaps: Array, pairs: Index, names: tuple[str, ...]) -> None:

@@ -105,11 +105,12 @@ class Sensors:
                 part.reset()
 
     def _unseen(self) -> tuple[str, tuple[str, ...]]:
-        """Severity of sick sensors, and names of those that cannot be trusted now."""
+        """At the end of every tick: severity of sick sensors, and names of those that cannot be trusted now."""
         severity, names = CLEAR, _NONE
         if self._sensing is not None:
             severity, names = self._sensing.health.severity, self._sensing.unseen
         if self._ranging is not None:
+            self._ranging.inbox.keep()
             severity = max(severity, self._ranging.watches.severity, key=(CLEAR, CAPPED, STOPPED).index)
             names = (*names, *self._ranging.watches.unseen)
         return severity, tuple(dict.fromkeys((*names, *self._units.odd))) if self._units.odd else names

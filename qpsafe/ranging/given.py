@@ -24,9 +24,11 @@ def rows_and_columns(shape: Any) -> tuple[int, int] | None:
     """Two whole numbers, whatever they are given as, of no more zones than memory may have room for; else None."""
     try:
         rows, columns = shape
+        if not (is_number(rows) and is_number(columns)):
+            return None
         whole = int(rows), int(columns)
         fits = whole[0] == rows and whole[1] == columns and abs(whole[0] * whole[1]) <= MOST_ZONES
-    except (TypeError, ValueError, OverflowError):  # not two, no numbers, not finite
+    except Exception:  # not two, or whatever a stranger's __iter__ raises
         return None
     return whole if fits else None
 
@@ -35,5 +37,5 @@ def parts_of(value: Any) -> tuple[Any, ...]:
     """What something consists of; nothing, where it does not."""
     try:
         return tuple(value)
-    except TypeError:
+    except Exception:  # whatever a stranger's __iter__ raises
         return ()

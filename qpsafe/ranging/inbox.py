@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from math import inf
 from operator import itemgetter
 from typing import Any
 
+from qpsafe.errors import in_words
 from qpsafe.ranging.checks import as_time
 from qpsafe.ranging.sensor import RangeImage, RangeSensor
 from qpsafe.sensing.detection import BadInput
@@ -16,7 +18,7 @@ MOST, LEFT = 100, 4
 
 
 class Inbox:
-    """Keeps images until there is time for them.
+    """Keeps images until there is time for them. Those of a tick are the caller's; those that it leaves, copies.
 
     Args:
         sensors: Whose images are expected.
@@ -31,6 +33,7 @@ class Inbox:
     def reset(self) -> None:
         """Forget all."""
         self._waiting: list[tuple[float, int, RangeImage]] = []
+        self._foreign = False  # whether any of these may not be ours
         self._notes: list[str] = []
 
     def put(self, images: Any) -> None:
@@ -44,12 +47,16 @@ class Inbox:
         if not (type(images) is list or isinstance(images, Iterable)):
             self._notes.append(f"images are no list of RangeImages but {type(images).__name__}")
             return
-        for image in images:
-            who = self._sender(image)
-            if isinstance(who, str):
-                self._notes.append(who)
-            else:
-                self._waiting.append((_when(image), who, image))
+        try:
+            for image in images:
+                who = self._sender(image)
+                if isinstance(who, str):
+                    self._notes.append(who)
+                else:
+                    self._waiting.append((_when(image), who, image))
+                    self._foreign = True
+        except Exception as error:  # a generator of the caller's: what it gave before counts
+            self._notes.append(f"images end before their time: {in_words(error)}")
         if len(self._waiting) > 1:
             self._waiting.sort(key=itemgetter(0, 1))
             self._leave_out(MOST)
@@ -64,8 +71,22 @@ class Inbox:
             count += 1
         taken, self._waiting = [one[1:] for one in self._waiting[:count]], self._waiting[count:]
         self._leave_out(LEFT)
+        self.keep()
         notes, self._notes = self._notes, []
         return taken, notes
+
+    def keep(self) -> None:
+        """Make what still waits at the end of a tick ours: its buffers are the caller's, who may use them again."""
+        if not self._foreign:
+            return
+        ours: list[tuple[float, int, RangeImage]] = []
+        for stamp, who, image in self._waiting:
+            try:
+                own = image if type(image) is _Own else _Own(image.sensor, *deepcopy(image[1:]))
+                ours.append((stamp, who, own))
+            except Exception as error:  # whatever a stranger's __deepcopy__ raises
+                self._notes.append(f"an image of {image.sensor.name} that had to wait is lost: {in_words(error)}")
+        self._waiting, self._foreign = ours, False
 
     def _leave_out(self, most: int) -> None:
         """Let no more images wait than so many for each sensor."""
@@ -79,6 +100,12 @@ class Inbox:
             return "an image is no RangeImage"
         found = self._index.get(image.sensor.name)
         return f"an image is of {image.sensor.name!r}, which is not among range_sensors" if found is None else found
+
+
+class _Own(RangeImage):
+    """An image that nobody else can write to."""
+
+    __slots__ = ()
 
 
 def _when(image: RangeImage) -> float:

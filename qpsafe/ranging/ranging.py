@@ -159,16 +159,16 @@ class RangeSensing:
         """
         now = self._now = check_clock(now, self._now)
         self._past.take(now, q)
+        self._numbers[0], self._numbers[4] = now, person
         notes = self._take_all(images, now, poses, wire)
         notes += self.watches.look(now)
-        self._numbers[0], self._numbers[4] = now, person
         total, moving = place_all(
             self._store, self._counts, self._carriers, self._patience, self._numbers, wire.starts, wire.ends,
             *self._placed, self._who, self._near, self._ages, self._leads,
         )  # fmt: skip
-        hidden = self._hidden(now, poses, wire)
+        hidden = self._hidden(now, poses, wire, person)
         if not total:
-            return Ranged(_NONE, _NO_LINKS, hidden, self._since(hidden), tuple(notes))
+            return Ranged(_NONE, _NO_LINKS, hidden.copy(), self._since(hidden), tuple(notes))
         points, links, velocities = self._placed[0][:total], self._placed[1][:total], self._placed[2][:total]
         if moving:
             points, velocities = self._ahead(points, velocities, wire, field)
@@ -200,11 +200,11 @@ class RangeSensing:
             value[:] = reals("the field's value", found, value.shape)
         return value, gradient
 
-    def _hidden(self, now: float, poses: Array, wire: Wire) -> Array:
+    def _hidden(self, now: float, poses: Array, wire: Wire, person: float) -> Array:
         """Where somebody may be whom no sensor sees, by the last images (p, 3) [m]; none unless that is asked for."""
         anew = self._looked or now - self._hidden_at > AGAIN  # the robot goes on where no image comes
         if self.rules.unseen == OCCUPIED and anew and self._together is not None:
-            places = self._together.unseen(wire, poses, now)
+            places = self._together.unseen(wire, poses, now, person)
             self._hidden_places, self._looked, self._hidden_at = places, False, now
         return self._hidden_places
 

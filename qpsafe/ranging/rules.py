@@ -26,7 +26,8 @@ class RangeRules(Fixed):
         few: But not if fewer zones than these should see known things.
         misplaced: Nor if fewer images than these in a row say so.
         dense: An image of more zones is reduced by tiles first, to at most this many.
-        support: How many pixels of a tile have to see a surface.
+        support: How many pixels of a tile have to see a surface; of tiles that are fewer pixels high or wide as many as
+            that, so that nothing is lost which a whole row or column sees.
         budget: How many zones are taken in one tick, at most; later images wait for the next one.
         predict: Whether things are tracked from image to image, so that their velocities count.
         horizon: How far ahead of now a thing that comes nearer counts, at its velocity [s].

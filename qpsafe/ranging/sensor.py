@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.ranging.given import is_number, parts_of, rows_and_columns
+from qpsafe.text.given import numbers
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -159,10 +160,10 @@ class RangeSensor:
         whole, where = rows_and_columns(shape), f"RangeSensor {name!r}"
         if whole is None or min(whole) < 1:
             raise ConfigurationError(where, "shape", shape, "rows and columns, whole numbers >= 1")
-        numbers = parts_of(intrinsics)
-        if not (len(numbers) == 4 and all(map(is_number, numbers)) and min(numbers[:2]) > 0.0):
+        optics = parts_of(intrinsics)
+        if not (len(optics) == 4 and all(map(is_number, optics)) and min(optics[:2]) > 0.0):
             raise ConfigurationError(where, "intrinsics", intrinsics, "fx, fy > 0 and cx, cy [pixels]")
-        shape, (fx, fy, cx, cy) = whole, numbers
+        shape, (fx, fy, cx, cy) = whole, optics
         v, u = np.meshgrid(np.arange(shape[0], dtype=float), np.arange(shape[1], dtype=float), indexing="ij")
         directions = _units(np.stack(((u - cx) / fx, (v - cy) / fy, np.ones_like(u)), axis=-1))
         half = np.arctan(np.sqrt(0.5) / min(fx, fy))
@@ -256,16 +257,16 @@ class RangeSensor:
             self._refuse("link", self.link, f"None, or a wire link from 0 to {links - 1}")
 
     def _numbers(self, key: str, shape: tuple[int, ...] | None) -> Array:
-        try:
-            array = np.asarray(getattr(self, key), dtype=np.float64)
-            array = array if shape is None else array.reshape(shape)
-        except (TypeError, ValueError, OverflowError):
-            self._refuse(key, getattr(self, key), f"numbers of shape {shape}")
+        value = getattr(self, key)
+        array = numbers(f"RangeSensor {self.name!r}", key, value, "real numbers, none of them masked")
         if not np.isfinite(array).all():
-            self._refuse(key, getattr(self, key), "finite numbers")
-        return array
+            self._refuse(key, value, "finite numbers")
+        try:
+            return array if shape is None else array.reshape(shape)
+        except ValueError:
+            self._refuse(key, value, f"numbers of shape {shape}")
 
-    def _refuse(self, key: str, value: object, expected: str) -> None:
+    def _refuse(self, key: str, value: object, expected: str) -> NoReturn:
         raise ConfigurationError(f"RangeSensor {self.name!r}", key, value, expected)
 
 

@@ -73,9 +73,7 @@ class Together:
         """Forget all images."""
         self.views: list[View | None] = [None] * len(self._lookers)
 
-    def take(
-        self, who: int, stamp: float, pose: Array, store: Array, counts: NDArray[np.int64], person: float = 0.0
-    ) -> None:
+    def take(self, who: int, stamp: float, pose: Array, store: Array, counts: NDArray[np.int64], person: float) -> None:
         """Take a usable image; points that others have lost, and that it looks through, are forgotten.
 
         A lost point may have moved since it was seen, by max(v_h, |ṗ| + a_h t) t: all of what it can have reached has
@@ -87,7 +85,7 @@ class Together:
             pose: Of the sensor then (4, 4).
             store: Points of all sensors (s, r, WIDTH).
             counts: How many points each holds (s,).
-            person: How fast people come, if that is more than what was given at first [m/s].
+            person: How fast people come now, see `_fastest` [m/s].
         """
         reducer = self._reducers[who]
         self.views[who] = View(stamp, pose, reducer.distances.copy(), reducer.valid.copy(), reducer.sigma.copy())
@@ -98,9 +96,13 @@ class Together:
             elapsed, (acceleration, fastest) = stamp - points[:, STAMP], self._running
             known = np.linalg.norm(points[:, VELOCITY : VELOCITY + 3], axis=1)
             known = np.where(known > 0.0, np.minimum(known + acceleration * elapsed, fastest), 0.0)
-            errors = points[:, WRONG] + np.maximum(known, max(self._person, person)) * elapsed
+            errors = points[:, WRONG] + np.maximum(known, self._fastest(person)) * elapsed
             through = self._through(who, np.ascontiguousarray(points[:, :3]), errors)
             store[sensors[through], rows[through], LOST] = -np.inf
+
+    def _fastest(self, person: float) -> float:
+        """How fast people come [m/s]: as was given at first, or now, where the gate knows of faster ones."""
+        return max(self._person, person)
 
     def _through(self, who: int, points: Array, errors: Array) -> NDArray[np.bool_]:
         view = self.views[who]
@@ -108,7 +110,7 @@ class Together:
             return np.zeros(len(points), dtype=np.bool_)
         return self._lookers[who](points, errors, view.pose, view.distances, view.valid, view.sigma)
 
-    def unseen(self, wire: Wire, poses: Array, now: float) -> Array:
+    def unseen(self, wire: Wire, poses: Array, now: float, person: float) -> Array:
         """Places near the robot that a sensor covers and that none looks through, nor anything known fills (p, 3) [m].
 
         Somebody may be there. Places are asked for around every link, see `ALONG` and `AWAY`, `HALF` apart.
@@ -117,6 +119,7 @@ class Together:
             wire: Of the robot now.
             poses: Of its bodies now (b, 4, 4).
             now: Present time [s].
+            person: How fast people come now, see `_fastest` [m/s].
         """
         axes = wire.ends - wire.starts
         along = (wire.starts[:, None] + np.array(ALONG)[:, None] * axes[:, None]).reshape(-1, 1, 1, 3)
@@ -133,6 +136,6 @@ class Together:
         places = places[covered]
         for who, view in enumerate(self.views):
             if view is not None and len(places):
-                moved = HALF + self._person * (now - view.stamp)
+                moved = HALF + self._fastest(person) * (now - view.stamp)
                 places = places[~self._through(who, places, np.full(len(places), moved))]
         return places

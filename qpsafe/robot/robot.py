@@ -19,6 +19,7 @@ from qpsafe.robot.models.mjcf import ENDLESS
 from qpsafe.robot.robot_file.spec import HeldJoint, Region, RobotSpec, Tool, Tuned
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
+from qpsafe.text.given import numbers
 from qpsafe.text.words import counted
 
 _FLOAT = np.dtype(np.float64)
@@ -228,16 +229,14 @@ class Robot(Fixed):
         """A float64 array of one value per joint, (n,).
 
         Raises:
-            ConfigurationError: Wrong shape, or not numbers.
+            ConfigurationError: Wrong shape, or no real numbers: text, masked or truth values.
         """
         if type(values) is np.ndarray and values.dtype == _FLOAT and values.shape == (self.nq,):  # the usual case
             return values
-        try:
-            array = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            array = None
-        if array is None or array.shape != (self.nq,):
-            raise ConfigurationError(f"robot {self.name}", key, values, f"{self.nq} numbers, one a joint")
+        expected = f"{self.nq} numbers, one a joint"
+        array = numbers(f"robot {self.name}", key, values, expected)
+        if array.shape != (self.nq,):
+            raise ConfigurationError(f"robot {self.name}", key, values, expected)
         return array
 
     def _no_frame(self, frame: object) -> ConfigurationError:

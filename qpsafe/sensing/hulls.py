@@ -14,18 +14,19 @@ from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
-from qpsafe.errors import ConfigurationError
-from qpsafe.text.given import numbers
+from qpsafe.errors import ConfigurationError, RobotFileError
+from qpsafe.robot.models.collada import head_of
+from qpsafe.text.given import number, numbers
 from qpsafe.text.words import call
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Obstacle:
     """A known obstacle that stands still: the convex hull of its vertices.
 
     Attributes:
         name: Shown in errors.
-        vertices: In the world frame, (v, 3) [m].
+        vertices: In the world frame, (v, 3) [m]; its own, and read-only.
 
     Raises:
         ConfigurationError: Not (v, 3), not finite, or no volume.
@@ -35,7 +36,15 @@ class Obstacle:
     vertices: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        half_spaces(self.name, self.vertices)
+        own = _corners(self.name, self.vertices)
+        own.flags.writeable = False
+        object.__setattr__(self, "vertices", own)
+        half_spaces(self.name, own)
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Unpickled and copied arrays can be written to again."""
+        self.__dict__.update(state)
+        self.vertices.flags.writeable = False
 
     def __repr__(self) -> str:
         return call(self, self.name, lowest=self.vertices.min(axis=0), highest=self.vertices.max(axis=0))
@@ -49,42 +58,70 @@ class Obstacle:
             size: Full edge lengths (3,) [m].
             centre: Its centre, world frame (3,) [m].
             pose: Instead of the centre, its pose (4, 4).
+
+        Raises:
+            ConfigurationError: Sizes, a centre or a pose that are none.
         """
-        edges = np.asarray(size, dtype=float)
-        if edges.shape != (3,) or not (np.isfinite(edges) & (edges > 0.0)).all():
-            raise ConfigurationError(f"obstacle {name}", "size", size, "three finite lengths > 0 [m]")
+        edges = _vector(name, "size", size, "three finite lengths > 0 [m]", 0.0)
         corners = np.array(list(product((-0.5, 0.5), repeat=3))) * edges
-        if np.size(pose):
-            return cls(name, _moved(name, corners, pose))
-        return cls(name, corners + np.asarray(centre, dtype=float))
+        place = _vector(name, "centre", centre, "three finite coordinates [m]")
+        return cls(name, _placed(name, corners, pose, place))
 
     @classmethod
     def mesh(cls, name: str, path: str | Path, pose: ArrayLike = (), scale: float = 1.0) -> Obstacle:
         """The convex hull of a mesh file (STL, OBJ, DAE ...), read by coal.
 
+        A DAE file is in the unit that it states; it is not turned to the upward axis that it states, as in robots.
+
         Args:
             name: Shown in errors.
             path: The file.
             pose: Of the mesh in the world, (4, 4); the identity by default.
-            scale: Metres in one unit of the file.
+            scale: Metres in one unit of the file; of a DAE file, by how much it is larger than it states.
+
+        Raises:
+            ConfigurationError: No such file, no mesh, a unit, a pose or a scale that are none.
         """
         import coal  # type: ignore[import-untyped]
 
-        if not os.path.isfile(path):
-            raise ConfigurationError(f"obstacle {name}", "path", str(path), "a mesh file")
+        where = f"obstacle {name}"
+        if not (isinstance(path, str | os.PathLike) and os.path.isfile(path)):
+            raise ConfigurationError(where, "path", path, "a mesh file")
+        metres = number(where, "scale", scale, "metres in one unit of the file, > 0", above=0.0)
         try:
+            metres *= head_of(Path(path), "path", Path(path)).metres
             vertices = np.array(coal.MeshLoader().load(str(path), np.ones(3)).vertices(), dtype=float)
+        except RobotFileError as error:  # it is no robot's
+            raise ConfigurationError(where, error.key, error.value, error.expected) from None
         except (ValueError, RuntimeError) as error:
-            raise ConfigurationError(f"obstacle {name}", "path", str(path), f"a mesh ({error})") from None
-        vertices = vertices.reshape(-1, 3) * scale
-        return cls(name, _moved(name, vertices, pose) if np.size(pose) else vertices)
+            raise ConfigurationError(where, "path", str(path), f"a mesh ({error})") from None
+        return cls(name, _placed(name, vertices.reshape(-1, 3) * metres, pose, np.zeros(3)))
 
 
-def _moved(name: str, points: Array, pose: ArrayLike) -> Array:
-    T = np.asarray(pose, dtype=float)
+def _vector(name: str, key: str, value: ArrayLike, expected: str, above: float = -np.inf) -> Array:
+    found = numbers(f"obstacle {name}", key, value, expected)
+    if found.shape != (3,) or not (np.isfinite(found) & (found > above)).all():
+        raise ConfigurationError(f"obstacle {name}", key, value, expected)
+    return found
+
+
+def _placed(name: str, points: Array, pose: ArrayLike, centre: Array) -> Array:
+    """Points as a pose moves them, or to a centre (3,) where no pose is given: ()."""
+    T = numbers(f"obstacle {name}", "pose", pose, expected := "a finite (4, 4) pose")
+    if not T.size:
+        return points + centre
     if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise ConfigurationError(f"obstacle {name}", "pose", pose, "a finite (4, 4) pose")
+        raise ConfigurationError(f"obstacle {name}", "pose", pose, expected)
     return points @ T[:3, :3].T + T[:3, 3]
+
+
+def _corners(name: str, vertices: ArrayLike) -> Array:
+    """Vertices (v, 3) as an array of its own."""
+    expected = "finite vertices (v, 3) that span a volume [m]"
+    points = numbers(f"obstacle {name}", "vertices", vertices, expected)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
+        raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
+    return points
 
 
 def half_spaces(name: str, vertices: ArrayLike) -> Array:
@@ -98,14 +135,12 @@ def half_spaces(name: str, vertices: ArrayLike) -> Array:
     """
     from scipy.spatial import QhullError
 
-    expected = "finite vertices (v, 3) that span a volume [m]"
-    points = numbers(f"obstacle {name}", "vertices", vertices, expected)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4 or not np.isfinite(points).all():
-        raise ConfigurationError(f"obstacle {name}", "vertices", f"an array of shape {points.shape}", expected)
+    points = _corners(name, vertices)
     try:
         return _planes(points.tobytes())
     except QhullError:
-        raise ConfigurationError(f"obstacle {name}", "vertices", f"{len(points)} flat vertices", expected) from None
+        flat = f"{len(points)} flat vertices"
+        raise ConfigurationError(f"obstacle {name}", "vertices", flat, "vertices that span a volume [m]") from None
 
 
 @lru_cache(maxsize=512)

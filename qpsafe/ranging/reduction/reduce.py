@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -50,8 +52,11 @@ class Shown(NamedTuple):
     sparse: int
 
 
-def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
-    """A sensor whose zones are tiles of another one's, and pixels along the edge of a tile.
+def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, tuple[int, int]]:
+    """A sensor whose zones are tiles of another one's, and how many pixels its tiles are high and wide, at least.
+
+    Tiles are about as high as wide, as angles go: a camera's are square, those of a scanner do not join its layers.
+    Pixels that are left over at the end are shared out, so that no tile is smaller than the others.
 
     Args:
         sensor: Of many zones in rows and columns.
@@ -61,28 +66,41 @@ def tiled(sensor: RangeSensor, most: int) -> tuple[RangeSensor, int]:
         ConfigurationError: What stands side by side in rows and columns does not look side by side.
     """
     rows, columns = sensor.shape
-    size = 1
-    while -(-rows // size) * -(-columns // size) > most:
-        size += 1
-    if size == 1:
-        return sensor, 1
     grid = sensor.directions.reshape(rows, columns, 3)
+    high, wide = _tile_size(grid, most)
+    if high == wide == 1:
+        return sensor, (1, 1)
     pitch = sensor.half_angle.reshape(rows, columns)
+    down, across = rows // high, columns // wide
+    tops, lefts = np.arange(down + 1) * rows // down, np.arange(across + 1) * columns // across
     directions, angles = [], []
-    for top in range(0, rows, size):
-        for left in range(0, columns, size):
-            part = grid[top : top + size, left : left + size].reshape(-1, 3)
+    for top, bottom in pairwise(tops.tolist()):
+        for left, right in pairwise(lefts.tolist()):
+            part = grid[top:bottom, left:right].reshape(-1, 3)
             middle = part.mean(axis=0)
             middle /= np.linalg.norm(middle)
             directions.append(middle)
-            cone = pitch[top : top + size, left : left + size].ravel()
+            cone = pitch[top:bottom, left:right].ravel()
             angles.append(float((np.arccos(np.clip(part @ middle, -1.0, 1.0)) + cone).max()))
-    shape = (-(-rows // size), -(-columns // size))
     # half the diagonal of a square that is its share of a full sphere is 2.5 / sqrt(n)
-    if max(angles) >= min(5.0 * 2.5 / len(angles) ** 0.5 + float(pitch.max()), 0.25 * np.pi):
+    if not max(angles) < min(5.0 * 2.5 / len(angles) ** 0.5 + float(pitch.max()), 0.25 * np.pi):
         expected = f"rows and columns whose neighbours look side by side, as of all sensors of more than {most} zones"
         raise ConfigurationError(f"RangeSensor {sensor.name!r}", "shape", sensor.shape, expected)
-    return replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=shape), size
+    zones = replace(sensor, directions=np.array(directions), half_angle=np.array(angles), shape=(down, across))
+    return zones, (high, wide)
+
+
+def _tile_size(grid: Array, most: int) -> tuple[int, int]:
+    """How many pixels high and wide tiles are, so that a grid of directions (rows, columns, 3) has at most so many."""
+    shape, pitch, size = grid.shape[:2], [], [1, 1]
+    for axis in (0, 1):
+        apart = np.linalg.norm(np.diff(grid, axis=axis), axis=-1)
+        pitch.append(max(float(np.median(apart)), 1e-9) if apart.size else np.inf)
+    while (shape[0] // size[0]) * (shape[1] // size[1]) > most:
+        # as large as one pixel more makes them where that is least; those of a single row are as high as that
+        angle = min((size[i] + 1) * pitch[i] for i in (0, 1) if size[i] < shape[i])
+        size = [min(max(math.ceil(angle / pitch[i] - 1e-9), 1), shape[i]) for i in (0, 1)]
+    return size[0], size[1]
 
 
 def view_of(directions: Array) -> tuple[float, ...]:
@@ -108,7 +126,6 @@ class Reducer:
 
     Attributes:
         zones: The sensor, or its tiles.
-        size: Pixels along the edge of a tile.
         distances, valid, sigma: Of the zones of the last image (z,).
         found: All points of the last image that count, as many as it was told to show (z, 4).
         kept: What the last image left, at least as many rows as `reduce` told, see `reduce_zones`.
@@ -118,14 +135,15 @@ class Reducer:
     def __init__(
         self, sensor: RangeSensor, rules: RangeRules, sensing: SensingRules, hulls: HullSet, links: int
     ) -> None:
-        self.zones, self.size = tiled(sensor, rules.dense)
+        self.zones, size = tiled(sensor, rules.dense)
         count = len(self.zones)
         self._slants = np.tan(self.zones.half_angle)
         self._numbers = np.array([
             sensor.range_min, sensor.range_max, sensing.tolerance, rules.spread, rules.reach, rules.deviations,
             *view_of(self.zones.directions),
         ])  # fmt: skip
-        self._tables, self._each, self._support = hulls.tables, rules.each, rules.support
+        self._tables, self._each = hulls.tables, rules.each
+        self._tiled, self._support = self.zones is not sensor, min(rules.support, *size)  # what one row sees counts
         self._stride = farthest_zone(count)
         self.found = np.empty((count, 4))
         things = len(hulls.tables[0])
@@ -150,14 +168,14 @@ class Reducer:
             carrier: The robot's body that the sensor sits on; -1 for none.
         """
         distances, valid, sigma = image.distances, image.valid, image.sigma
-        if self.size > 1:
-            shape, nearest, known = image.shape, *self._tiles
-            tile(distances.reshape(shape), valid.reshape(shape), self.size, self._support, nearest, known)
+        if self._tiled:
+            shape, tiles, (nearest, known) = image.shape, self.zones.shape, self._tiles
+            tile(distances.reshape(shape), valid.reshape(shape), *tiles, self._support, nearest, known)
             if sigma.strides[0] == 0:  # one number
                 sigma = np.full(len(nearest), sigma[0])
             else:
                 spread, sigma = sigma.reshape(shape), np.empty(len(nearest))
-                tile_sigma(distances.reshape(shape), valid.reshape(shape), spread, self.size, nearest, sigma)
+                tile_sigma(distances.reshape(shape), valid.reshape(shape), spread, *tiles, nearest, sigma)
             distances, valid = nearest, known
         self.distances, self.valid, self.sigma = distances, valid, sigma
         count = reduce_zones(

@@ -13,7 +13,7 @@ from math import inf
 import numpy as np
 from numba import types
 
-from qpsafe.compiled.compiled import Array, add, entry, readable, row
+from qpsafe.compiled.compiled import Array, add, entry, inline, readable, row
 from qpsafe.ranging.reduction import looking_kernel, nearest_kernel
 from qpsafe.ranging.reduction.looking_kernel import (
     DEVIATIONS,
@@ -36,6 +36,7 @@ VALID, HITS, OWN, KNOWN, EXPECTED, THROUGH, IMPOSSIBLE, SEEN, SPARSE = range(9)
 SHOWN = 9
 
 _ints = types.Array(types.int64, 1, "C", readonly=True)
+_flags = types.Array(types.boolean, 2, "A", readonly=True)
 _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (2, 3))
 _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
@@ -158,13 +159,15 @@ def reduce_zones(
     return c
 
 
-@entry(
-    types.void(
-        readable(2), types.Array(types.boolean, 2, "A", readonly=True), types.int64, types.int64, _out,
-        types.boolean[::1],
-    )
-)  # fmt: skip
-def tile(distances: Array, valid: Array, size: int, support: int, nearest: Array, known: Array) -> None:
+@inline
+def edges(i: int, rows: int, columns: int, down: int, across: int) -> tuple[int, int, int, int]:
+    """First row of tile i of down x across and the one after its last, then its columns likewise."""
+    v, u = i // across, i % across
+    return v * rows // down, (v + 1) * rows // down, u * columns // across, (u + 1) * columns // across
+
+
+@entry(types.void(readable(2), _flags, types.int64, types.int64, types.int64, _out, types.boolean[::1]))
+def tile(distances: Array, valid: Array, down: int, across: int, support: int, nearest: Array, known: Array) -> None:
     """The nearest surface in each tile of a dense image: what `support` pixels see as near as that.
 
     Fewer pixels are noise, or edges that mix what is before them with what is behind; only what reads less than nothing
@@ -173,18 +176,17 @@ def tile(distances: Array, valid: Array, size: int, support: int, nearest: Array
     Args:
         distances: Of the pixels (rows, columns) [m].
         valid: Likewise.
-        size: Pixels along the edge of a tile; those at the right and lower end may be smaller.
-        support: How many, from 1 to 4.
+        down, across: How many tiles share the rows, and the columns.
+        support: How many, from 1 to 4; no more than tiles are high or wide, or what one row or column sees is lost.
         nearest: Filled, one a tile, row by row [m]; inf where nothing is in sight.
         known: Filled: whether at least `support` pixels of the tile are valid.
     """
     rows, columns = distances.shape
-    wide = (columns + size - 1) // size
-    for i in range(nearest.shape[0]):
-        top, left = size * (i // wide), size * (i % wide)
+    for i in range(down * across):
+        top, bottom, left, right = edges(i, rows, columns, down, across)
         a, b, c, e, count = inf, inf, inf, inf, 0
-        for y in range(top, min(top + size, rows)):
-            for x in range(left, min(left + size, columns)):
+        for y in range(top, bottom):
+            for x in range(left, right):
                 d = distances[y, x]
                 if valid[y, x] and d == d:
                     count += 1
@@ -200,27 +202,26 @@ def tile(distances: Array, valid: Array, size: int, support: int, nearest: Array
         known[i] = count >= support or a < 0.0
 
 
-@entry(
-    types.void(
-        readable(2), types.Array(types.boolean, 2, "A", readonly=True), readable(2), types.int64, readable(1), _out
-    )
-)  # fmt: skip
-def tile_sigma(distances: Array, valid: Array, sigma: Array, size: int, nearest: Array, spread: Array) -> None:
+@entry(types.void(readable(2), _flags, readable(2), types.int64, types.int64, readable(1), _out))
+def tile_sigma(
+    distances: Array, valid: Array, sigma: Array, down: int, across: int, nearest: Array, spread: Array
+) -> None:
     """How uncertain the surface in each tile is: as much as the worst of the pixels that are as near as it.
 
     Args:
         distances, valid, sigma: Of the pixels (rows, columns) [m].
-        size: Pixels along the edge of a tile.
+        down, across: How many tiles share the rows, and the columns.
         nearest: Of the tiles, see `tile`.
         spread: Filled, one a tile [m].
     """
-    wide = (distances.shape[1] + size - 1) // size
-    spread[:] = 0.0
-    for y in range(distances.shape[0]):
-        for x in range(distances.shape[1]):
-            i = (y // size) * wide + x // size
-            if valid[y, x] and distances[y, x] <= nearest[i]:  # false for NaN
-                spread[i] = max(spread[i], sigma[y, x])
+    rows, columns = distances.shape
+    for i in range(down * across):
+        (top, bottom, left, right), worst = edges(i, rows, columns, down, across), 0.0
+        for y in range(top, bottom):
+            for x in range(left, right):
+                if valid[y, x] and distances[y, x] <= nearest[i]:  # false for NaN
+                    worst = max(worst, sigma[y, x])
+        spread[i] = worst
 
 
 def farthest_zone(size: int) -> int:

@@ -118,7 +118,7 @@ def test_zones_without_order_are_not_taken_for_tiles(seed: int) -> None:
     """Their cones would be as wide as the image, and hide everybody near the robot."""
     camera = RangeSensor.camera("camera", (60, 80), (57.0, 57.0, 39.5, 29.5))
     sensor, size = tiled(camera, 1000)
-    assert size == 3
+    assert size == (3, 3)
     assert np.degrees(sensor.half_angle.max()) < 5.0
     mixed = np.random.default_rng(seed).permutation(len(camera))
     with pytest.raises(ConfigurationError, match="side by side"):

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.ranging.rules import RangeRules
 from qpsafe.ranging.sensor import RangeSensor
 from qpsafe.sensing.rules import SensingRules
@@ -131,6 +134,27 @@ def eye(*place: float) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, 3] = place
     return pose
+
+
+@settings(max_examples=5)
+@given(st.floats(1.7, 6.0), st.lists(st.floats(0.004, 0.29), min_size=1, max_size=3, unique=True))
+def test_how_fast_people_come_counts_the_same_whoever_says_it(
+    run: Any, eyes: Any, speed: float, times: list[float]
+) -> None:
+    """What is free may be occupied a while later, by those of the gate as by those of the spots."""
+    pose = eyes.looking((0.0, 0.0, 0.6), (2.6, 0.0, 0.6))
+    sensor = RangeSensor.array("array", 16, 16, 1.2, pose=pose, period=0.1)
+    found = []
+    for approach in (1.6, speed):
+        loop = run(
+            spots="off", range_sensors=[sensor], ranging=RangeRules(unseen="occupied"), gate=VerifiedMotion(speed),
+            sensing=SensingRules(approach_speed=approach),
+        )  # fmt: skip
+        ticks = [loop.feed(loop.q, loop.qd, images=[sensor.image(np.full(256, 3.9), stamp=0.0)], now=0.002)]
+        ticks += [loop.feed(loop.q, loop.qd, images=[], now=now) for now in sorted({*times, 0.295})]
+        found.append([tick.near.tolist() for tick in ticks])
+    assert found[0] == found[1]
+    assert len(found[0][-1]) > 0 or speed < 3.0
 
 
 @pytest.mark.parametrize("speed", [0.8, 1.6, 2.4])

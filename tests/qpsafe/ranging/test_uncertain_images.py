@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -62,16 +63,20 @@ def test_what_is_behind_a_person_does_not_change_how_uncertain_the_person_is(
 @given(SEEDS)
 def test_a_tile_is_as_uncertain_as_the_worst_pixel_of_its_surface(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    rows, columns, size, support = *rng.integers(1, 12, 2), int(rng.integers(2, 5)), int(rng.integers(1, 5))
+    rows, columns, support = (int(n) for n in rng.integers(1, (12, 12, 5)))
+    down, across = int(rng.integers(1, rows + 1)), int(rng.integers(1, columns + 1))
     distances = rng.choice([0.5, 1.0, 1.5, np.inf, np.nan], (rows, columns))
     valid, sigma = rng.random((rows, columns)) < 0.8, rng.random((rows, columns))
-    count = -(-rows // size) * -(-columns // size)
+    count = down * across
     nearest, known, spread = np.empty(count), np.empty(count, dtype=np.bool_), np.empty(count)
-    tile(distances, valid, size, support, nearest, known)
-    tile_sigma(distances, valid, sigma, size, nearest, spread)
-    for i in range(count):
-        top, left = size * (i // -(-columns // size)), size * (i % -(-columns // size))
-        part = np.s_[top : top + size, left : left + size]
+    tile(distances, valid, down, across, support, nearest, known)
+    tile_sigma(distances, valid, sigma, down, across, nearest, spread)
+    tops, lefts = (np.arange(n + 1) * of // n for n, of in ((down, rows), (across, columns)))
+    for i, (y, x) in enumerate(product(range(down), range(across))):
+        part = np.s_[tops[y] : tops[y + 1], lefts[x] : lefts[x + 1]]
+        read = np.sort(distances[part][valid[part] & ~np.isnan(distances[part])])
+        assert known[i] == (len(read) >= support)
+        assert nearest[i] == (read[support - 1] if known[i] else np.inf)
         counts = valid[part] & (distances[part] <= nearest[i])
         assert spread[i] == (sigma[part][counts].max() if counts.any() else 0.0)
 
@@ -83,7 +88,7 @@ def test_less_than_nothing_in_any_pixel_is_less_than_nothing_in_its_tile(seed: i
     y, x = rng.integers(0, 9, 2).tolist()
     distances[y, x], valid[y, x] = rng.choice([-1.0, -np.inf]), True
     nearest, known = np.empty(9), np.empty(9, dtype=np.bool_)
-    tile(distances, valid, 3, int(rng.integers(1, 5)), nearest, known)
+    tile(distances, valid, 3, 3, int(rng.integers(1, 5)), nearest, known)
     assert nearest[3 * (y // 3) + x // 3] < 0.0
     assert known[3 * (y // 3) + x // 3]
     assert (nearest < 0.0).sum() == 1
