@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -43,6 +42,34 @@ class ProjectionName(StrEnum):
     paper = "paper"
 
 
+#: What the simulated plant rounds to: its physics step [s].
+STEP = 0.001
+
+
+def whole_steps(context: typer.Context, param: typer.CallbackParam, value: float) -> float:
+    """Callback of an option: a time that the plant need not round.
+
+    Args:
+        context: The command's.
+        param: The option.
+        value: What was typed [s].
+
+    Raises:
+        ConfigurationError: It is no whole number of its steps.
+    """
+    if abs(value - STEP * round(value / STEP)) > 1e-9:
+        expected = f"a multiple of the plant's step, {STEP} s"
+        raise ConfigurationError(context.command_path, param.opts[0], value, expected)
+    return value
+
+
+Lag = Annotated[
+    float,
+    typer.Option(
+        min=0.0, max=0.1, callback=whole_steps,
+        help=f"Servo lag of the plant, a multiple of {STEP} [s]; EGM has 0.01 to 0.02.",
+    ),
+]  # fmt: skip
 RobotName = Annotated[str, typer.Option(help="A bundled robot, a robot folder, MJCF or URDF, or PACKAGE:MODEL.")]
 
 
@@ -108,8 +135,8 @@ def make_law(name: LawName, projection: ProjectionName, solver: str | None = Non
 
     Args:
         name: Which law.
-        projection: Of the hierarchical law; the others take no notice.
-        solver: Of the hierarchical law; its default if None.
+        projection: Of the hierarchical law; the others have none.
+        solver: Of the QPs; the law's default if None.
     """
     from qpsafe.laws.by_name import law_named
 
@@ -227,37 +254,3 @@ def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
     with whole_file(path) as part:
         part.write_text(text, encoding="utf-8")
-
-
-def finite(context: typer.Context, param: typer.CallbackParam, value: float | None) -> float | None:
-    """Callback of an option: a number that is one, neither infinite nor NaN, which no bound holds back.
-
-    Args:
-        context: The command's.
-        param: The option.
-        value: What was typed, None for nothing.
-
-    Raises:
-        ConfigurationError: It is something else.
-    """
-    if value is not None and not math.isfinite(value):
-        raise ConfigurationError(context.command_path, param.opts[0], value, "a finite number")
-    return value
-
-
-def refuse_idle(context: typer.Context, switch: str) -> None:
-    """Refuse options that were typed and would do nothing: `--web-port` and the like count together with `--web` only.
-
-    Args:
-        context: Of the command.
-        switch: Name of the option that has to be on, with which the names of the others begin.
-
-    Raises:
-        ConfigurationError: One of these was typed while that is off.
-    """
-    for parameter in context.command.params if not context.params[switch] else ():
-        name = str(parameter.name)
-        typed = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
-        if typed and name.startswith(f"{switch}_"):
-            option, value = parameter.opts[0], context.params[name]
-            raise ConfigurationError(context.command_path, option, value, f"only together with --{switch}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, finite, print_json, progress_bar, verdict
+from qpsafe.cli.common import console, print_json, progress_bar, verdict
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
@@ -29,9 +29,7 @@ def compare(
         int | None, typer.Option(min=18, max=10_000_000, help="Number of random states.", show_default=f"{SAMPLE[0]:,}")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of the random states.")] = 0,
-    tolerance: Annotated[
-        float, typer.Option(min=0.0, help="Largest deviation that is accepted [rad/s].", callback=finite)
-    ] = 1e-8,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Largest deviation that is accepted [rad/s].")] = 1e-8,
     closed_loop: Annotated[bool, typer.Option(help="Also compare whole runs of the first experiment.")] = True,
     duration: Annotated[
         float | None,

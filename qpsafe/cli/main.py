@@ -11,10 +11,11 @@ from typing import Annotated
 import typer
 
 from qpsafe import __version__
-from qpsafe.cli import bench, check, compare, replay, robots, story, tune, web
+from qpsafe.cli import bench, check_program, compare, replay, robots, story, tune, web
 from qpsafe.cli.campaign.app import app as campaigns
 from qpsafe.cli.common import Group, console
 from qpsafe.cli.demos.app import app as demos
+from qpsafe.cli.idle import check_all
 from qpsafe.cli.irc5 import irc5_faults, irc5_sim, stream
 from qpsafe.cli.sensors import calibrate, calibrate_camera, place, sick_sensors
 from qpsafe.errors import QpsafeError
@@ -33,7 +34,7 @@ app.command("compare")(compare.compare)
 app.add_typer(robots.app, name="robots")
 app.command("tune")(tune.tune)
 app.command("bench")(bench.bench)
-app.command("check")(check.check)
+app.command("check")(check_program.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("calibrate-camera")(calibrate_camera.calibrate_camera)
 app.command("story")(story.story)
@@ -44,6 +45,7 @@ app.command("sick-sensors")(sick_sensors.sick_sensors)
 app.command("stream")(stream.stream)
 app.command("irc5-sim")(irc5_sim.irc5_sim)
 app.command("irc5-faults")(irc5_faults.irc5_faults)
+check_all(app)
 
 
 def _version(value: bool) -> None:

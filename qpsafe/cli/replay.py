@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import console, print_json, progress_bar, refuse_idle
+from qpsafe.cli.common import console, print_json, progress_bar
 from qpsafe.cli.outputs import output_file
 from qpsafe.text.words import counted
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 def replay(
-    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="A run.npz written by a demo.")],
     video: Annotated[
         Path | None, typer.Option(help="Also film the recorded run to this mp4.", callback=output_file(".mp4"))
@@ -40,7 +39,6 @@ def replay(
     Exit code 0 if all are the same, 1 at the first bit that differs: which tick, which answer, by how much, and which
     versions or robot files have changed since.
     """
-    refuse_idle(context, "web")
     screen = console(json)
     if web:
         from qpsafe.sim.web.server import check_port, need_viser

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from qpsafe.sim.tuning.search import Progress, Search
 
 WHERE = "qpsafe tune"
-JOURNAL = "search.jsonl"
+JOURNAL, JUDGED = "search.jsonl", "judged"
 
 
 def tune(
@@ -68,9 +68,10 @@ def tune(
 ) -> None:
     """Search for better parameters of the controller among people at random, and judge them by others.
 
-    What is found is written to a copy of the robot's folder, with a report. The search goes on where it was stopped by
-    the same command. Exit code 1 if with the values found it touches furniture or itself more often than with the
-    present ones, or passes a joint limit; more harm or more work lost is in the report only.
+    What is found is written to a copy of the robot's folder (its present values, where nothing speaks for others), with
+    a report. The search goes on where it was stopped by the same command. Exit code 1 if with the values found it
+    touches furniture or itself more often than with the present ones, or passes a joint limit; more harm or more work
+    lost is in the report only.
     """
     screen = console(json)
     require("tune", WHERE, "optuna", "pyarrow")
@@ -78,6 +79,7 @@ def tune(
     from qpsafe.sim.experiments.shared.folder import check_place
     from qpsafe.sim.tuning.finals import MOST as FINALS
     from qpsafe.sim.tuning.front import PREFERENCES
+    from qpsafe.sim.tuning.robot_file import check_writing
     from qpsafe.sim.tuning.search import MOST, Search
 
     if prefer not in PREFERENCES:
@@ -91,7 +93,9 @@ def tune(
     plan = _plan(robot, program, cell, people)
     search = Search(plan, seed)
     folder = Path("out") / f"tune-{search.plan.digest()[:8]}" if out is None else out
-    check_place(load_quietly(plan.robot), folder / "robot")  # where the copy with the values goes
+    for copy in ("robot", JUDGED):  # where copies with the values go
+        check_place(load_quietly(plan.robot), folder / copy)
+    check_writing(load_quietly(plan.robot))
     with executor_at(dask) as executor, _kept(folder, screen):
         crew = {"executor": executor, "workers": workers}
         journal = _searched(search, trials, folder, minutes, screen, crew)
@@ -195,7 +199,7 @@ def _shown(bar: Any, trials: int) -> Progress:
 
 
 def _judged(found: Tuned, folder: Path, encounters: int, screen: Console, crew: dict[str, Any]) -> Judged | None:
-    """Write the chosen values to a copy of the robot's folder, and judge what the copy says.
+    """Judge what a copy of the robot's folder says that states the chosen values.
 
     Args:
         found: Of the search.
@@ -209,10 +213,9 @@ def _judged(found: Tuned, folder: Path, encounters: int, screen: Console, crew: 
     from qpsafe.sim.tuning.robot_file import write_folder
 
     plan = found.search.plan
-    values = found.space.at(found.chosen.point)
-    copy = write_folder(load_quietly(plan.robot), values, found.run, folder / "robot")
     if encounters == 0 or found.chosen.number == 0:
         return None
+    copy = write_folder(load_quietly(plan.robot), found.space.at(found.chosen.point), found.run, folder / JUDGED)
     with counting("encounters that judge", screen) as count:
         return judge(plan, copy, encounters, folder, progress=count, **crew)
 
@@ -242,15 +245,16 @@ def _report(found: Tuned, judged: Judged | None, folder: Path, screen: Console, 
     """
     from qpsafe.sim.tuning.page import tuning_page
     from qpsafe.sim.tuning.result import result
+    from qpsafe.sim.tuning.robot_file import write_choice
 
-    said = result(found, judged)
+    said, copy = result(found, judged), write_choice(found, judged, folder)
     write_text(folder / "tune.json", json_text(said) + "\n")
     write_text(folder / "tune.html", tuning_page(said))
     if json:
         print_json(said)
         return
     _show(said, screen)
-    screen.print(f"written to {folder}: tune.html, tune.json, robot/robot.toml", soft_wrap=True)
+    screen.print(f"written to {folder}: tune.html, tune.json, {copy}", soft_wrap=True)
 
 
 def _show(said: dict[str, Any], screen: Console) -> None:

@@ -93,18 +93,15 @@ def web(
 
 
 def ready_robot(name: str, screen: Console) -> str:
-    """Name of a robot that can be shown: a bare file gets a folder with a home posture and sensors, see `any_robot`.
+    """Name of a robot that can be shown: a bare model gets a folder with a home posture and sensors, see `any_robot`.
 
     Args:
         name: What was typed.
         screen: Where it is said what was chosen.
     """
-    from qpsafe.cli.demos.any_robot import any_robot, own_folder
+    from qpsafe.cli.demos.any_robot import ready_name
 
-    if not Path(name).is_file():
-        return name
-    any_robot("qpsafe web", name, own_folder(name), screen, joints=4)
-    return str(own_folder(name) / "robot")
+    return ready_name("qpsafe web", name, screen, 4)
 
 
 @contextmanager

@@ -19,14 +19,16 @@ def law_named(name: str, projection: str = "strict", solver: str | None = None) 
 
     Args:
         name: One of `LAWS`.
-        projection: Of the hierarchical law, one of `PROJECTIONS`; other laws ignore it.
+        projection: Of the hierarchical law, one of `PROJECTIONS`; the others have none, whichever is named.
         solver: Of the QPs; the law's default if None. The null-space law solves none.
 
     Raises:
-        ConfigurationError: There is none of this name, or it has no use for a solver.
+        ConfigurationError: There is none of this name, no such projection, or the law has no use for a solver.
     """
+    if projection not in PROJECTIONS:
+        raise ConfigurationError("law_named", "projection", projection, "one of " + ", ".join(PROJECTIONS))
     if name == "hierarchical":
-        return HierarchicalLaw(cast("Any", projection), solver=solver)  # which checks it
+        return HierarchicalLaw(cast("Any", projection), solver=solver)
     if name == "nullspace":
         if solver is not None:
             raise ConfigurationError("law_named", "solver", solver, "none with the law nullspace: it solves no QP")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from qpsafe.errors import ConfigurationError
@@ -20,6 +20,8 @@ except ImportError:  # Windows: nobody is kept out, which is said
 def alone_in(folder: Path | None) -> Iterator[None]:
     """Keep a folder for this process; whatever ends it, kill -9 too, gives the folder back.
 
+    Folders that were made for it are taken away again where an error, or Ctrl-C, left nothing in them.
+
     Args:
         folder: Made if it is not there; None for none.
 
@@ -32,7 +34,20 @@ def alone_in(folder: Path | None) -> Iterator[None]:
     if folder is None:
         yield
         return
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with _locked(folder):
+            yield
+    except BaseException:
+        for path in new:
+            with suppress(OSError):  # something is in it
+                path.rmdir()
+        raise
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
     if fcntl is None:
         _say_unguarded(folder)
         yield
@@ -53,4 +68,4 @@ def alone_in(folder: Path | None) -> Iterator[None]:
 
 def _say_unguarded(folder: Path) -> None:
     words = f"{folder} cannot be locked here: make sure that no other process is at work in it"
-    warnings.warn(words, UserWarning, stacklevel=4)
+    warnings.warn(words, UserWarning, stacklevel=6)

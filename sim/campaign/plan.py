@@ -10,9 +10,8 @@ from __future__ import annotations
 import hashlib
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,12 +19,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-import qpsafe
-import qpsafe.robots
-import qpsafe.sim
-import qpsafe.tasks
 from qpsafe.errors import ConfigurationError
-from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
+from qpsafe.robot.loader import bundled_robots, find_robot
+from qpsafe.sim.campaign.digests import code_digest, files_digest, files_in, robot_digest
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.ranging.sets import sensor_kinds
 from qpsafe.text.json_text import json_text
@@ -72,6 +68,25 @@ class Plan:
     cell: str | None = None
 
     def __post_init__(self) -> None:
+        self._check_values()
+        self._check_files()
+
+    @classmethod
+    def stored(cls, said: Mapping[str, Any]) -> Plan:
+        """A plan as a file of JSON says it, every key: its values are checked, but not whether what it names is there.
+
+        Raises:
+            ConfigurationError: Names key and value of what is wrong.
+        """
+        if said.keys() != {field.name for field in fields(cls)}:
+            raise ConfigurationError("Plan", "keys", ", ".join(said), ", ".join(field.name for field in fields(cls)))
+        plan = object.__new__(cls)
+        for key, value in said.items():
+            object.__setattr__(plan, key, tuple(value) if isinstance(value, list) else value)
+        plan._check_values()
+        return plan
+
+    def _check_values(self) -> None:
         sensor_kinds(self.sensor)
         if isinstance(self.lag, bool) or not isinstance(self.lag, int | float):
             raise ConfigurationError("Plan", "lag", self.lag, "a number [s]")
@@ -92,6 +107,8 @@ class Plan:
             value = getattr(self, key)
             if not isinstance(value, str) and (value is not None or key == "robot"):
                 raise ConfigurationError("Plan", key, value, "a name or a path, as text")
+
+    def _check_files(self) -> None:
         # os.path, unlike Path, says False of what cannot be a name
         for motion in self.motions:
             if motion not in MOTIONS and not (motion.endswith(".toml") and os.path.isfile(motion)):
@@ -114,25 +131,43 @@ class Plan:
         """For JSON."""
         return asdict(self)
 
+    def placed(self) -> dict[str, Any]:
+        """For JSON that is read from whatever folder: paths of robot, people and cell are whole."""
+        said = self.to_dict()
+        here = {key: said[key] for key in ("robot", "people", "cell") if said[key] is not None}
+        bundled = bundled_robots()
+        return said | {key: os.path.abspath(v) for key, v in here.items() if v not in bundled and os.path.exists(v)}
+
+    def named(self) -> dict[str, Any]:
+        """What decides its rows, for JSON, but for contents of files: of these it has names, wherever they lie."""
+        return names_only({key: value for key, value in self.to_dict().items() if key != "trials"})
+
     def identity(self) -> dict[str, Any]:
         """What decides a trial's rows: the plan but for its length, contents of its files, and the code's digest."""
-        named = self.to_dict()
-        del named["trials"]
-        files = [path for path in (*self.motions, self.people or "", self.cell or "") if path and os.path.exists(path)]
+        from qpsafe.sim.campaign.opponents.registry import maker_digest
+
+        files = {"people": self.people, "cell": self.cell}
+        files |= {motion: motion for motion in self.motions if motion not in MOTIONS}
+        makers = {}
         for name in self.controllers:
-            place = name.removesuffix(PERFECT).rpartition(":")[0]
+            base = name.removesuffix(PERFECT)
+            place = base.rpartition(":")[0]
             if place:  # a user's own
                 module = None if place.endswith(".py") else find_spec(place)
-                files.append(place if module is None else str(module.origin))
-        named |= {"with": {name: version(name) for name in ("numpy", "numba", "pin", "mujoco")}}
-        found = {path: _digest(_inside(Path(path))) for path in files}
+                files[place] = place if module is None else str(module.origin)
+            elif (maker := maker_digest(base)) is not None:
+                makers[base] = maker
+        there = {key: Path(path) for key, path in files.items() if path is not None and os.path.exists(path)}
+        found = {key: files_digest(files_in(path)) for key, path in there.items()}
         if self.robot not in bundled_robots():  # whose files are part of the code
-            found[self.robot] = _robot_digest(self.robot)
-        return named | {"files": found, "code": code_digest()}
+            found["robot"] = robot_digest(self.robot)
+        versions = {name: version(name) for name in ("numpy", "numba", "pin", "mujoco")}
+        said = self.named() | {"with": versions, "files": found, "code": code_digest()}
+        return said | ({"registered": makers} if makers else {})
 
     def digest(self) -> str:
         """64 hexadecimal digits that stand for `identity`."""
-        return hashlib.sha256(json_text(self.identity(), indent=None, sort_keys=True).encode()).hexdigest()
+        return identity_digest(self.identity())
 
     def options(self, besides: Sequence[str] = ()) -> str:
         """Options of the command line that make this plan: those that differ from the default one.
@@ -151,6 +186,18 @@ class Plan:
                 ",".join(value) if many else f"{value!r}" if field.name == "lag" else str(value),
             ]
         return shlex.join(words)
+
+
+def identity_digest(identity: Mapping[str, Any]) -> str:
+    """64 hexadecimal digits that stand for a plan's identity, the same after JSON."""
+    return hashlib.sha256(json_text(identity, indent=None, sort_keys=True).encode()).hexdigest()
+
+
+def names_only(said: Mapping[str, Any]) -> dict[str, Any]:
+    """What a plan says, of the paths of robot, people and cell the last names only."""
+    paths = {key: said.get(key) for key in ("robot", "people", "cell")}
+    names = {key: os.path.basename(os.path.normpath(path)) for key, path in paths.items() if isinstance(path, str)}
+    return dict(said) | names
 
 
 _Word = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
@@ -209,42 +256,3 @@ def _check_controller(name: str) -> None:
         opponent(name)
     except ConfigurationError as wrong:
         raise ConfigurationError("Plan", "controllers", name, wrong.expected) from None
-
-
-@cache
-def code_digest() -> str:
-    """64 hexadecimal digits that stand for the code and the models that decide a trial's rows."""
-    packages = (qpsafe, qpsafe.tasks, qpsafe.robots, qpsafe.sim)
-    folders = [Path(path) for package in packages for path in package.__path__]
-    files = [(path.relative_to(folder), path) for folder in folders for path in _inside(folder)]
-    deciding = [path for name, path in sorted(files) if path.suffix in _CODE and not _OUTPUT & set(name.parts)]
-    return _digest(deciding)
-
-
-def _robot_digest(name: str) -> str:
-    """64 hexadecimal digits that stand for a robot: its own files, and its shapes, whatever files of meshes say them.
-
-    Nothing else that lies in its folder counts, the trials themselves among it.
-    """
-    robot = load_quietly(name)
-    own = {find_robot(name), robot.model_path, *robot.folder.glob("spots*.toml")}
-    own |= set() if robot.spots_path is None else {robot.spots_path}
-    found = hashlib.sha256(_digest(sorted(own)).encode())
-    for body, shape, vertices in robot.hulls():
-        found.update(f"{body} {shape}".encode() + vertices.tobytes())
-    return found.hexdigest()
-
-
-#: Endings of what decides, and folders of what only shows.
-_CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", "report", "limit", "plugins", "irc5"}
-
-
-def _inside(path: Path) -> list[Path]:
-    return sorted(item for item in path.rglob("*") if item.is_file()) if path.is_dir() else [path]
-
-
-def _digest(files: Sequence[Path]) -> str:
-    found = hashlib.sha256()
-    for file in files:
-        found.update(hashlib.sha256(file.read_bytes()).digest())
-    return found.hexdigest()

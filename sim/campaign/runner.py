@@ -9,8 +9,8 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import closing
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, closing, nullcontext
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -20,8 +20,9 @@ from qpsafe.errors import QpsafeError
 from qpsafe.extras import require
 from qpsafe.sim.campaign.alone import alone_in
 from qpsafe.sim.campaign.executors import answers, crew_at_work
+from qpsafe.sim.campaign.manifest import read_manifest, versions_now
 from qpsafe.sim.campaign.plan import Plan
-from qpsafe.sim.campaign.store import Played, Store, read, stored_plan, stored_versions, versions
+from qpsafe.sim.campaign.store import Played, Store, read
 from qpsafe.sim.campaign.trials.rows import Columns, columns_of, joined
 
 #: Plays a trial: plan, number -> a row a controller. Deterministic, and possible to pickle.
@@ -110,8 +111,7 @@ def run_campaign(
     play = partial(play_trials, trial or _engine(), plan)
     if out is not None:
         require("campaign", "a folder of trials", "pyarrow")  # before one is made
-    with alone_in(out):
-        store = None if out is None else Store(out, plan)
+    with alone_in(out), _stored(out, plan) as store:
         finished = set() if store is None else store.trials() & set(range(plan.trials))
         parts: list[Played] = []
         count, kept = len(finished), perf_counter()
@@ -135,9 +135,14 @@ def run_campaign(
                     store.keep(parts)
         if store is None:
             whole = Played(joined([p.columns for p in parts], plan.controllers), sum(p.seconds for p in parts))
+            made = Results(plan, whole.columns, whole.seconds, None, versions_now())
         else:
-            whole = store.read()
-    return Results(plan, whole.columns, whole.seconds, perf_counter() - begun, versions())
+            made = stored_results(store.folder)
+    return replace(made, wall=perf_counter() - begun)
+
+
+def _stored(out: Path | None, plan: Plan) -> AbstractContextManager[Store | None]:
+    return nullcontext() if out is None else closing(Store(out, plan))
 
 
 def stored_results(folder: Path) -> Results:
@@ -147,9 +152,9 @@ def stored_results(folder: Path) -> Results:
         MissingExtraError: pyarrow is not installed.
         ConfigurationError: It is no folder of a campaign, or a file cannot be read.
     """
-    plan = stored_plan(folder)
-    whole = read(folder, plan)
-    return Results(plan, whole.columns, whole.seconds, None, stored_versions(folder))
+    manifest = read_manifest(folder)
+    whole = read(folder, manifest.plan)
+    return Results(manifest.plan, whole.columns, whole.seconds, None, manifest.versions)
 
 
 def play_trials(trial: TrialFunction, plan: Plan, piece: Trials) -> Played:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import MissingExtraError
 from qpsafe.reference import JointReference
+from qpsafe.sim.campaign.digests import file_name_of
 from qpsafe.sim.campaign.trials.closest import closest
 from qpsafe.sim.campaign.trials.contact import part_name
 from qpsafe.sim.campaign.trials.measures import measures
@@ -25,7 +25,7 @@ from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.campaign.trials.trial import recorded
 from qpsafe.sim.drawing.film import Film
 from qpsafe.sim.world.scene import CAMERA, Scene, build_scene
-from qpsafe.text.words import file_word
+from qpsafe.text.whole_file import whole_file
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.plan import Plan
@@ -73,7 +73,7 @@ def show(
     met = meeting(plan, what)
     out.mkdir(parents=True, exist_ok=True)
     name = f"trial-{what}" if isinstance(what, int) else label
-    name += "-" + file_word(controller)
+    name += "-" + file_name_of(controller)
     answers: list[tuple[float, float, float, str]] = []
 
     def note(k: int, q: Array, tick: Tick) -> None:
@@ -172,18 +172,13 @@ def _write_table(path: Path, met: Meeting, run: Recording, answers: list[tuple[f
     joints = met.station.robot.joint_names
     head = ["time [s]", "distance [m]", "body", "part", "points seen", "cdf_n", "m", "f", "regime", "phase", "status",
             "path time [s]", *(f"q {j} [rad]" for j in joints), *(f"qd {j} [rad/s]" for j in joints)]  # fmt: skip
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(head)
-            for k, (cdf_n, m, f, regime) in enumerate(answers):
-                figures = (f"{value:.9g}" for value in (*run.q[k], *run.qd[k]))
-                writer.writerow(
-                    [f"{k * run.dt:.3f}", f"{near.distance[k]:.6f}", met.station.body_name(int(near.body[k])),
-                     part_name(met.tracks, int(near.segment[k])), len(run.points[k]), f"{cdf_n:.6g}", f"{m:.6g}",
-                     f"{f:.6g}", regime, run.phase[k], run.status[k], f"{run.path_time[k]:.6f}", *figures]
-                )  # fmt: skip
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(head)
+        for k, (cdf_n, m, f, regime) in enumerate(answers):
+            figures = (f"{value:.9g}" for value in (*run.q[k], *run.qd[k]))
+            writer.writerow(
+                [f"{k * run.dt:.3f}", f"{near.distance[k]:.6f}", met.station.body_name(int(near.body[k])),
+                 part_name(met.tracks, int(near.segment[k])), len(run.points[k]), f"{cdf_n:.6g}", f"{m:.6g}",
+                 f"{f:.6g}", regime, run.phase[k], run.status[k], f"{run.path_time[k]:.6f}", *figures]
+            )  # fmt: skip

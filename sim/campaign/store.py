@@ -1,18 +1,15 @@
 """Finished trials on disk: Parquet files beside a manifest that says whose they are.
 
-Every file is written under another name first and then renamed, so a file is whole or not there, whatever ends the
-process. Its name stands for the trials in it: no file is ever overwritten by another one.
+One reader checks every file against the manifest, whoever asks: rows of another campaign, or rows that do not pair, are
+refused by name. Every file is written under another name first and then renamed, so a file is whole or not there,
+whatever ends the process. Its name stands for the trials in it: no file is ever overwritten by another one.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-import platform
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,16 +17,13 @@ import numpy as np
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.extras import require
+from qpsafe.sim.campaign.manifest import MANIFEST, Manifest, lasting_file, read_manifest, versions_now
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.trials.rows import COLUMNS, DTYPES, NAMES, Columns, joined
-from qpsafe.text.json_text import json_text
+from qpsafe.text.json_text import plain
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-FORMAT = "qpsafe campaign 1"
-MANIFEST = "manifest.json"
-PACKAGES = ("qpsafe", "numpy", "scipy", "numba", "mujoco", "pin")
 
 
 class Played(NamedTuple):
@@ -62,51 +56,47 @@ class Store:
         folder.mkdir(parents=True, exist_ok=True)
         for left in folder.glob(".*.part"):  # of a process that was killed
             left.unlink(missing_ok=True)
-        identity = plan.identity()
-        if (folder / MANIFEST).exists():
-            there = _manifest(folder)["identity"]
-            for key in (key for key in identity if there.get(key) != json.loads(json_text(identity[key]))):
-                raise ConfigurationError(
-                    folder,
-                    key,
-                    there.get(key),
-                    f"{identity[key]!r}, as now: trials of both do not mix; take another folder",
-                )
-        _write(
-            folder / MANIFEST,
-            json_text({"format": FORMAT, "plan": plan.to_dict(), "identity": identity, "versions": versions()}) + "\n",
-        )
+        self._identity, self._new = plain(plan.identity()), not (folder / MANIFEST).exists()
+        there = Manifest(plan, self._identity, {}) if self._new else read_manifest(folder)
+        if (key := _other(there.identity, self._identity)) is not None:
+            expected = f"{self._identity.get(key)!r}, as now: trials of both do not mix; take another folder"
+            raise ConfigurationError(folder, key, there.identity.get(key), expected)
+        self._manifest = there._replace(plan=plan, identity=self._identity)
+        self._manifest.write(folder)
+
+    def close(self) -> None:
+        """Take the manifest away again if it is new and no trial was finished."""
+        if self._new and not _files(self.folder):
+            (self.folder / MANIFEST).unlink(missing_ok=True)
 
     def trials(self) -> set[int]:
         """Numbers of the trials that are kept."""
-        found: set[int] = set()
-        for file in _files(self.folder):
-            with _reading(file):
-                found.update(self._parquet.ParquetFile(file).read(["trial"])["trial"].to_pylist())
-        return found
+        return set(self.read().columns["trial"].tolist())
 
     def keep(self, parts: Iterable[Played]) -> None:
         """Write finished trials into a file of their own.
 
         Raises:
             OSError: The disk is full, or the folder has gone.
+            ConfigurationError: A file of the plan was edited while they were played: nobody knows whose they are.
         """
         parts = list(parts)
         if not parts:
             return
+        now = plain(self.plan.identity())
+        if (key := _other(self._identity, now)) is not None:
+            expected = f"{self._identity.get(key)!r}, as when it began: trials that were played since are not kept"
+            raise ConfigurationError(self.folder, key, now.get(key), expected)
         columns = joined([part.columns for part in parts], self.plan.controllers)
-        meta = {"seconds": repr(sum(part.seconds for part in parts))}
+        meta = {"seconds": repr(sum(part.seconds for part in parts)), "plan": self._manifest.digest}
         fields = [
-            self._arrow.field(
-                c.name,
-                self._arrow.from_numpy_dtype(DTYPES[c.kind]),
-                metadata={"unit": c.unit, "meaning": c.meaning},
-            )
-            for c in COLUMNS
+            self._arrow.field(c.name, _type(c.kind), metadata={"unit": c.unit, "meaning": c.meaning}) for c in COLUMNS
         ]
         table = self._arrow.table([columns[name] for name in NAMES], self._arrow.schema(fields, meta))
         name = hashlib.sha256(np.unique(columns["trial"]).tobytes()).hexdigest()[:16]
-        with _replacing(self.folder / f"trials-{name}.parquet") as part:
+        self._manifest = self._manifest.with_versions(versions_now())
+        self._manifest.write(self.folder)
+        with lasting_file(self.folder / f"trials-{name}.parquet") as part:
             self._parquet.write_table(table, part, compression="zstd")
 
     def read(self) -> Played:
@@ -123,61 +113,72 @@ def read(folder: Path, plan: Plan) -> Played:
 
     Raises:
         MissingExtraError: pyarrow is not installed.
-        ConfigurationError: A file cannot be read, or has other columns.
+        ConfigurationError: A file cannot be read, has other columns, or rows that are not the campaign's.
     """
-    _, parquet = _pyarrow()
+    manifest = read_manifest(folder)
     parts, seconds = [], 0.0
     for file in _files(folder):
-        with _reading(file):
-            table = parquet.ParquetFile(file).read()
-            cost = float(table.schema.metadata[b"seconds"])
-            arrays = {name: table[name].to_numpy() for name in NAMES}
-        here: Columns = {c.name: np.asarray(arrays[c.name], dtype=DTYPES[c.kind]) for c in COLUMNS}
+        here, cost = _rows(file, manifest)
         wanted: NDArray[np.bool_] = here["trial"] < plan.trials
-        seconds += cost * float(wanted.mean())
+        seconds += cost * float(wanted.mean()) if len(wanted) else 0.0
         parts.append({name: values[wanted] for name, values in here.items()})
     return Played(joined(parts, plan.controllers), seconds)
 
 
 def stored_plan(folder: Path) -> Plan:
-    """The plan of a folder's trials, as it was: not checked against what is here now.
+    """The plan of a folder's trials, as it was: what it names may have gone since.
 
     Raises:
         ConfigurationError: The folder has no manifest, or an invalid one.
     """
-    said = _manifest(folder)["plan"]
-    plan = object.__new__(Plan)  # people's file, say, may have gone since
-    for key, value in said.items():
-        object.__setattr__(plan, key, tuple(value) if isinstance(value, list) else value)
-    return plan
+    return read_manifest(folder).plan
 
 
 def stored_versions(folder: Path) -> dict[str, str]:
     """Versions of what the trials were played with."""
-    return dict(_manifest(folder)["versions"])
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and the packages that decide numbers."""
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in PACKAGES}
-
-
-def _manifest(folder: Path) -> dict[str, Any]:
-    file = folder / MANIFEST
-    try:
-        said = json.loads(file.read_text(encoding="utf-8"))
-        assert said["format"] == FORMAT
-        assert said["plan"].keys() == Plan().to_dict().keys()
-        return {"identity": dict(said["identity"]), "plan": said["plan"], "versions": said["versions"]}
-    except (OSError, ValueError, KeyError, AttributeError, TypeError, AssertionError) as error:
-        problem = f"{type(error).__name__} {error}".strip()
-        raise ConfigurationError(
-            folder, MANIFEST, problem, f"a folder of a campaign, with a manifest: {FORMAT!r}"
-        ) from None
+    return read_manifest(folder).versions
 
 
 def _files(folder: Path) -> list[Path]:
     return sorted(folder.glob("trials-*.parquet"))
+
+
+def _rows(file: Path, manifest: Manifest) -> tuple[Columns, float]:
+    """Rows of a file and the seconds they took; all of them are the manifest's."""
+    _, parquet = _pyarrow()
+    with _reading(file):
+        table = parquet.ParquetFile(file).read()
+        meta = table.schema.metadata
+        seconds, whose = float(meta[b"seconds"]), meta.get(b"plan", manifest.digest.encode()).decode()
+        for c in COLUMNS:
+            if table.schema.field(c.name).type != _type(c.kind) or table[c.name].null_count:
+                raise ValueError(f"{c.name} has other values than {c.kind.__name__}, or none")
+        arrays = {name: table[name].to_numpy() for name in NAMES}
+    here: Columns = {c.name: np.asarray(arrays[c.name], dtype=DTYPES[c.kind]) for c in COLUMNS}
+    expected = "trials of one campaign in a folder; take the file away, and they are played again"
+    if whose != manifest.digest:
+        raise ConfigurationError(file, "plan", whose, f"{manifest.digest}, the manifest's: {expected}")
+    plan, trial = manifest.plan, here["trial"]
+    numbers = np.unique(trial)
+    for key, wanted in (
+        ("trial", np.repeat(numbers, len(plan.controllers))),
+        ("controller", np.tile(plan.controllers, len(numbers))),
+        ("seed", plan.seed + trial),
+    ):
+        if (trial < 0).any() or not np.array_equal(here[key], wanted):
+            problem = f"{len(trial)} rows of {len(numbers)} trials"
+            needed = f"of each trial one row of {', '.join(plan.controllers)}, its seed {plan.seed} + trial: {expected}"
+            raise ConfigurationError(file, key, problem, needed)
+    return here, seconds
+
+
+def _other(one: dict[str, Any], other: dict[str, Any]) -> str | None:
+    """The first key in which two identities differ; None if they do not."""
+    return next((key for key in {**other, **one} if one.get(key) != other.get(key)), None)
+
+
+def _type(kind: type) -> Any:
+    return _pyarrow()[0].from_numpy_dtype(DTYPES[kind])
 
 
 @contextmanager
@@ -197,21 +198,3 @@ def _pyarrow() -> tuple[Any, Any]:
     import pyarrow.parquet
 
     return pyarrow, pyarrow.parquet
-
-
-def _write(path: Path, text: str) -> None:
-    with _replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A path to write to, which takes the place of another one when it is on the disk."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -38,6 +38,8 @@ OUTPUTS = ("q_ref", "qd_ref", "cdf_n", "m", "f", "regime", "phase", "status")
 #: Packages whose arithmetic decides the last bits.
 PACKAGES = ("qpsafe", "numpy", "scipy", "numba", "pin", "mujoco", "daqp", "ruckig")
 FPS = 25
+#: Begins fingerprints of a robot; older ones, of all that lay in its folder and of nothing else, cannot be compared.
+PRINT = "sha256:"
 #: No run of ten minutes, the longest that a demo makes, expands to a third of this [bytes].
 LARGEST = 2**29
 
@@ -110,11 +112,17 @@ def versions() -> dict[str, str]:
 
 
 def fingerprint(robot: Robot) -> str:
-    """SHA-256 of the robot's files that decide what the controller does."""
+    """SHA-256 of what decides what the controller does: the robot's own files, wherever they lie, and its shapes.
+
+    Nothing else that lies in its folder counts; shapes do, whatever files of meshes say them.
+    """
     digest = hashlib.sha256()
-    for path in sorted(p for p in robot.folder.iterdir() if p.suffix in (".toml", ".xml", ".urdf")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
+    files = {robot.folder / "robot.toml", robot.model_path, *robot.folder.glob("spots*.toml"), robot.spots_path}
+    for path in sorted((path for path in files if path is not None and path.is_file()), key=lambda path: path.name):
+        digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    for body, shape, vertices in robot.hulls():
+        digest.update(f"{body} {shape}".encode() + vertices.tobytes())
+    return PRINT + digest.hexdigest()
 
 
 def write_run(

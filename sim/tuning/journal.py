@@ -13,12 +13,34 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict, ValidationError
+
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.tuning.objectives import Outcome, Played
-from qpsafe.sim.tuning.trial import Trial, played_from_dict, played_to_dict
+from qpsafe.sim.tuning.trial import Trial, played_to_dict
 from qpsafe.text.json_text import json_text
 
 FORMAT = "qpsafe tuning 1"
+
+
+class _First(BaseModel):
+    """The first line."""
+
+    model_config = ConfigDict(extra="ignore", strict=True)
+
+    format: str
+    identity: dict[str, Any]
+
+
+class _Line(BaseModel):
+    """Any other line."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    seconds: float
+    trials: list[Trial] = []
+    finals: dict[int, tuple[int, list[Outcome]]] = {}
+    reference: dict[int, list[Outcome]] | None = None
 
 
 class Journal:
@@ -29,7 +51,7 @@ class Journal:
         identity: What is searched, for JSON: a file of another search is refused.
 
     Raises:
-        ConfigurationError: The file is of another search or of other code, or is none.
+        ConfigurationError: The file is of another search or of other code, or is none; names the line that is wrong.
     """
 
     def __init__(self, path: Path | None, identity: Mapping[str, Any]) -> None:
@@ -49,17 +71,29 @@ class Journal:
             self._write(said)
             return
         lines = _whole_lines(path)
-        there = _parsed(path, lines[0]) if lines else said
-        if there.get("format") != FORMAT:
-            raise ConfigurationError(path, "format", there.get("format"), f"{FORMAT!r}: the journal of a tuning")
-        for key, value in said["identity"].items():
-            if there["identity"].get(key) != value:
-                expected = f"{value!r}, as now: another search needs another folder"
-                raise ConfigurationError(path, key, there["identity"].get(key), expected)
-        if not lines:
+        if lines:
+            self._check(path, said, lines[0])
+        else:
             self._write(said)
-        for line in lines[1:]:
-            self._take(_parsed(path, line))
+        for number, line in enumerate(lines[1:], start=2):
+            try:
+                self._take(_Line.model_validate_json(line))
+            except ValueError as problem:
+                raise _wrong(path, number, line, problem) from None
+
+    @staticmethod
+    def _check(path: Path, said: Mapping[str, Any], line: str) -> None:
+        """Whether the first line says the same search."""
+        try:
+            there = _First.model_validate_json(line)
+        except ValueError as problem:
+            raise _wrong(path, 1, line, problem) from None
+        if there.format != FORMAT:
+            raise ConfigurationError(path, "format", there.format, f"{FORMAT!r}: the journal of a tuning")
+        for key, value in said["identity"].items():
+            if there.identity.get(key) != value:
+                expected = f"{value!r}, as now: another search needs another folder"
+                raise ConfigurationError(path, key, there.identity.get(key), expected)
 
     @property
     def folder(self) -> Path | None:
@@ -97,16 +131,27 @@ class Journal:
     def _keep(self, line: Mapping[str, Any]) -> None:
         if self._path is not None:
             self._write(line)
-        self._take(json.loads(json_text(line)))
+        self._take(_Line.model_validate_json(json_text(line, indent=None)))
 
-    def _take(self, line: Mapping[str, Any]) -> None:
-        self.trials += [Trial.from_dict(said) for said in line.get("trials", ())]
-        self.seconds += line["seconds"]
-        for number, (first, runs) in line.get("finals", {}).items():
-            before = self.finals.get(int(number), [])
-            self.finals[int(number)] = before[:first] + [Outcome(*run) for run in runs]
-        if "reference" in line:
-            self.reference = played_from_dict(line["reference"])
+    def _take(self, line: _Line) -> None:
+        """Add what a line says.
+
+        Raises:
+            ValueError: It does not go on from the lines before it.
+        """
+        if [trial.number for trial in line.trials] != [len(self.trials) + k for k in range(len(line.trials))]:
+            raise ValueError(f"trials that go on from number {len(self.trials)}")
+        for number, (first, _) in line.finals.items():
+            if not 0 <= first <= len(self.finals.get(number, ())):
+                raise ValueError(f"finals of trial {number} that go on from {len(self.finals.get(number, ()))}")
+        if line.reference is not None and 0 not in line.reference:
+            raise ValueError("outcomes of the present values without lag")
+        self.trials += line.trials
+        self.seconds += line.seconds
+        for number, (first, runs) in line.finals.items():
+            self.finals[number] = self.finals.get(number, [])[:first] + runs
+        if line.reference is not None:
+            self.reference = line.reference
 
     def _write(self, line: Mapping[str, Any]) -> None:
         assert self._path is not None
@@ -129,10 +174,18 @@ def _whole_lines(path: Path) -> list[str]:
         raise ConfigurationError(path, "file", str(error), "the journal of a tuning") from None
 
 
-def _parsed(path: Path, line: str) -> dict[str, Any]:
-    try:
-        said = json.loads(line)
-        assert isinstance(said, dict)
-        return said
-    except (ValueError, AssertionError):
-        raise ConfigurationError(path, "line", line[:60], "a line of JSON, as a tuning writes them") from None
+def _wrong(path: Path, number: int, line: str, problem: ValueError) -> ConfigurationError:
+    """What is to be said of a line.
+
+    Args:
+        path: Of the file.
+        number: Of the line, from 1.
+        line: Its text.
+        problem: Why it cannot be used.
+    """
+    why = str(problem)
+    if isinstance(problem, ValidationError):
+        first = problem.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "all of it"
+        why = f"a line of JSON as a tuning writes them ({where}: {first['msg']})"
+    return ConfigurationError(path, f"line {number}", line[:60], why)

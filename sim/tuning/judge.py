@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 ENCOUNTERS = 1200
 #: Below it a difference counts.
 LEVEL = 0.001
+#: Fewer encounters decide nothing, whatever came of them.
+LEAST = 20
 
 
 class Difference(NamedTuple):
@@ -61,21 +63,28 @@ class Judged(NamedTuple):
     counts: dict[str, tuple[int, int]]
     excess: float
 
+    @property
+    def enough(self) -> bool:
+        """Whether there are encounters enough to compare."""
+        return self.encounters >= LEAST
+
     def better(self, key: str) -> bool:
         """Whether the tuned values are surely better in a mean."""
-        found = self.means[key].difference
-        return found.value < 0.0 and found.p is not None and found.p < LEVEL
+        return self.means[key].difference.value < 0.0 and self._surely(key)
 
     def worse(self, key: str) -> bool:
         """Whether they are surely worse."""
-        found = self.means[key].difference
-        return found.value > 0.0 and found.p is not None and found.p < LEVEL
+        return self.means[key].difference.value > 0.0 and self._surely(key)
+
+    def _surely(self, key: str) -> bool:
+        p = self.means[key].difference.p
+        return self.enough and p is not None and p < LEVEL
 
     @property
     def new_faults(self) -> list[str]:
         """What the tuned values do that the present ones do less."""
         found = [name for name in ("furniture", "self") if self.counts[name][1] > self.counts[name][0]]
-        return found + (["limits"] if self.excess > 0.0 else [])
+        return found + ([] if self.excess <= 0.0 else ["limits"])  # NaN is no excess that is kept
 
     @property
     def dominates(self) -> bool:
@@ -187,6 +196,8 @@ def sentence(judged: Judged) -> str:
     )
     if judged.new_faults:
         return f"Do not take the tuned values: they are worse in {', '.join(judged.new_faults)}. {figures}"
+    if not judged.enough:
+        return f"Too few encounters to compare, {LEAST} at least: the present values stay. {figures}"
     if judged.dominates:
         return f"The tuned values are better in both: {figures}"
     if judged.worth:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isfinite
 from typing import Any
 
 from qpsafe.sim.campaign.report.figures import svg
@@ -79,7 +80,9 @@ def _judged(said: dict[str, Any]) -> Iterator[Html]:
     rows = []
     for key, (title, form) in _MEANS.items():
         mean = said["means"][key]
-        limits = f"{form.format(mean['low'])} to {form.format(mean['high'])}"
+        limits = "no limits"  # of too few encounters
+        if isfinite(mean["low"]):
+            limits = f"{form.format(mean['low'])} to {form.format(mean['high'])}"
         shown = (form.format(mean[name]) for name in ("present", "tuned", "value"))
         rows.append((title, *shown, limits, f"{mean['p']:.2g}"))
     yield table(("mean of", "present", "tuned", "difference", "95 %", "p"), rows)

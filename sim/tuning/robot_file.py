@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.errors import ConfigurationError
@@ -13,13 +15,17 @@ from qpsafe.robot.loader import load_quietly
 from qpsafe.robot.robot_file.schema import Units
 from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.tuning.values import Values, present
-from qpsafe.text.lines import toml_lines
+from qpsafe.text.whole_file import whole_file
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
+    from qpsafe.sim.tuning.judge import Judged
+    from qpsafe.sim.tuning.result import Tuned
 
 #: Begins the comment that names the run; one of an earlier run gives way.
 MARK = "# qpsafe tune:"
+#: A comment to the end of its line, or a number.
+_PIECES = re.compile(r"#[^\r\n]*|[+-]?(?:inf|nan|\d[\w.+-]*)")
 _HEADER = re.compile(r"""\s*\[\[?\s*[\w."' -]+\s*\]?\]\s*(#.*)?$""")
 
 
@@ -43,6 +49,26 @@ def write_folder(robot: Robot, values: Values, run: str, folder: Path) -> Path:
     return folder
 
 
+def write_choice(found: Tuned, judged: Judged | None, folder: Path) -> str:
+    """Write what a search chose to a copy of the robot's folder; the present values, if nothing speaks for it.
+
+    Args:
+        found: Of the search.
+        judged: The judgement, if there was one.
+        folder: For the copy, `robot`.
+
+    Returns:
+        What was written, in words.
+    """
+    robot = load_quietly(found.search.plan.robot)
+    for_it = judged is None or (not judged.new_faults and any(map(judged.better, ("harm", "lost"))))
+    if found.chosen.number == 0 or not for_it:
+        write_folder(robot, present(robot), f"{found.run}; nothing spoke for others", folder / "robot")
+        return "robot/robot.toml with the present values, since nothing speaks for others"
+    write_folder(robot, found.space.at(found.chosen.point), found.run, folder / "robot")
+    return "robot/robot.toml"
+
+
 def write_values(file: Path, robot: Robot, values: Values, run: str) -> None:
     """State values in a robot's file, and read it again: it must say them, and all else as before.
 
@@ -55,20 +81,41 @@ def write_values(file: Path, robot: Robot, values: Values, run: str) -> None:
     Raises:
         ConfigurationError: The file is written in a way that cannot be edited; it is as it was then.
     """
-    before = file.read_text(encoding="utf-8-sig")  # some editors begin with a mark
-    text = edited(before, _in_units(before, robot, values), f"{MARK} {run}")
+    before = file.read_bytes()
+    mark = codecs.BOM_UTF8 * before.startswith(codecs.BOM_UTF8)  # some editors begin with one
+    said = before.removeprefix(mark).decode("utf-8")
+    text = edited(said, _in_units(said, robot, values), f"{MARK} {run}")
     if text is None:
         expected = "tables [danger], [evasion], [recovery], [sensing] and [gate] with a line of its own for each key"
         raise ConfigurationError(file, "danger", "written in another way", expected)
-    file.write_text(text, encoding="utf-8")
-    try:
-        off = farthest(present(load_quietly(file.parent)), values)
-    except BaseException:
-        file.write_text(before, encoding="utf-8")
-        raise
-    if off > 1e-9:
-        file.write_text(before, encoding="utf-8")
-        raise ConfigurationError(file, "danger", f"reads {off:.1g} off what was written", "the same values")
+    with whole_file(file) as part:
+        trial = part.with_suffix(".toml")  # beside the model that it names
+        trial.write_bytes(mark + text.encode())
+        try:
+            off = farthest(present(load_quietly(trial)), values)
+            if off > 1e-9:
+                raise ConfigurationError(file, "danger", f"reads {off:.1g} off what was written", "the same values")
+            trial.replace(part)
+        finally:
+            trial.unlink(missing_ok=True)
+
+
+def check_writing(robot: Robot) -> None:
+    """Refuse a robot whose file cannot be edited, before anything is searched for it.
+
+    Args:
+        robot: Loaded from a folder or a model file.
+
+    Raises:
+        ConfigurationError: Its file is written in a way that cannot be edited.
+    """
+    with TemporaryDirectory() as place:
+        try:
+            write_folder(robot, present(robot), "a trial", Path(place, "robot"))
+        except ConfigurationError as problem:  # of the copy: it is the robot's own file that is to be changed
+            raise ConfigurationError(
+                robot.folder / "robot.toml", problem.key, problem.value, problem.expected
+            ) from None
 
 
 def farthest(first: Values, second: Values) -> float:
@@ -82,7 +129,7 @@ def farthest(first: Values, second: Values) -> float:
 
 
 def edited(text: str, tables: Mapping[str, Mapping[str, Any]], comment: str) -> str | None:
-    """The text of a TOML file in which some tables state some values.
+    """The text of a TOML file in which some tables state some values; line ends and comments stay as they are.
 
     Args:
         text: As it was.
@@ -92,9 +139,11 @@ def edited(text: str, tables: Mapping[str, Mapping[str, Any]], comment: str) -> 
     Returns:
         None where that could not be done by lines.
     """
-    lines = toml_lines(text)
+    lines = text.removesuffix("\n").split("\n")  # a line keeps its carriage return
+    end = "\r" if lines[0].endswith("\r") else ""
+    lines[-1] += end * (not lines[-1].endswith("\r"))  # the last line may have had no end
     for table, values in tables.items():
-        lines = _with_table(lines, table, values, comment)
+        lines = _with_table(lines, table, values, comment, end)
     found = "\n".join(lines) + "\n"
     wanted = tomllib.loads(text)
     for table, values in tables.items():
@@ -106,48 +155,69 @@ def edited(text: str, tables: Mapping[str, Mapping[str, Any]], comment: str) -> 
         return None
 
 
-def _with_table(lines: list[str], table: str, values: Mapping[str, Any], comment: str) -> list[str]:
-    header = re.compile(rf"\s*\[\s*{table}\s*\]\s*(#.*)?$")
+def _with_table(lines: list[str], table: str, values: Mapping[str, Any], comment: str, end: str) -> list[str]:
+    """The lines with the values in a table, which is added if there is none.
+
+    Args:
+        lines: Of the file.
+        table: Its name.
+        values: Key -> number or list of numbers.
+        comment: Under its header.
+        end: Carriage return of new lines, if any.
+    """
+    header = re.compile(rf"\s*\[\s*([\"']?){table}\1\s*\]\s*(#.*)?$")
     start = next((k for k, line in enumerate(lines) if header.match(line)), None)
     if start is None:
-        stated = [f"{key} = {_shown(value)}" for key, value in values.items()]
-        return [*lines, "", f"[{table}]", comment, *stated]
-    end = next((k for k in range(start + 1, len(lines)) if _HEADER.match(lines[k])), len(lines))
-    body, left = [comment], dict(values)
-    k = start + 1
-    while k < end:
-        line = lines[k]
-        key = line.partition("=")[0].strip()
-        if key in left and "=" in line:
-            stop = _end_of_value(lines, k, end)
-            rest = _trailing_comment(lines[stop - 1])
-            body.append(f"{key} = {_shown(left.pop(key))}{rest}")
-            k = stop
+        stated = [f"{key} = {_shown(value)}{end}" for key, value in values.items()]
+        return [*lines, end, f"[{table}]{end}", comment + end, *stated]
+    stop = next((k for k in range(start + 1, len(lines)) if _HEADER.match(lines[k])), len(lines))
+    body, left, k = [comment + end], dict(values), start + 1
+    while k < stop:
+        key = lines[k].partition("=")[0].strip().strip("\"'")
+        if key in left and "=" in lines[k]:
+            after = _end_of_value(lines, k, stop)
+            body += _restated(lines[k:after], left.pop(key))
+            k = after
             continue
-        if not line.startswith(MARK):
-            body.append(line)
+        if not lines[k].startswith(MARK):
+            body.append(lines[k])
         k += 1
-    last = len(body)
-    while last > 1 and (not body[last - 1].strip() or body[last - 1].lstrip().startswith("#")):
-        last -= 1  # what stands over the next table belongs to it
-    added = [f"{key} = {_shown(value)}" for key, value in left.items()]
-    return [*lines[: start + 1], *body[:last], *added, *body[last:], *lines[end:]]
+    last_stated = len(body)
+    while last_stated > 1 and (not body[last_stated - 1].strip() or body[last_stated - 1].lstrip().startswith("#")):
+        last_stated -= 1  # what stands over the next table belongs to it
+    added = [f"{key} = {_shown(value)}{end}" for key, value in left.items()]
+    return [*lines[: start + 1], *body[:last_stated], *added, *body[last_stated:], *lines[stop:]]
 
 
 def _end_of_value(lines: list[str], start: int, end: int) -> int:
     """The line after a value that may go over several."""
     for stop in range(start + 1, end + 1):
         try:
-            tomllib.loads("\n".join(lines[start:stop]))
+            tomllib.loads("\n".join(lines[start:stop]) + "\n")
             return stop
         except tomllib.TOMLDecodeError:
             continue
     return start + 1
 
 
-def _trailing_comment(line: str) -> str:
-    found = re.search(r"\s+#[^\"']*$", line)
-    return found.group(0) if found else ""
+def _restated(lines: list[str], value: Any) -> list[str]:
+    """The lines of a key with another value: number by number if it has as many, else with its comments above it.
+
+    Args:
+        lines: Of the key and its value, numbers only.
+        value: Number or list of numbers.
+    """
+    key, equals, text = "\n".join(lines).partition("=")
+    wanted, listed = (value, True) if isinstance(value, list) else ([value], False)
+    there = [found for found in _PIECES.finditer(text) if not found.group().startswith("#")]
+    if listed is text.lstrip().startswith("[") and len(there) == len(wanted):
+        for found, number in zip(reversed(there), reversed(wanted), strict=True):
+            text = text[: found.start()] + repr(number) + text[found.end() :]
+        return (key + equals + text).split("\n")
+    *above, last = [re.search(r"#.*|\r?$", line[len(key) * (k == 0) :]) for k, line in enumerate(lines)]
+    said = [found.group() for found in above if found is not None and found.group().startswith("#")]
+    rest = "" if last is None else last.group()
+    return [*said, f"{key.rstrip()} = {_shown(value)}{'  ' * rest.startswith('#')}{rest}"]
 
 
 def _shown(value: Any) -> str:

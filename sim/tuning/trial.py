@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from qpsafe.sim.tuning.front import Objectives, front
-from qpsafe.sim.tuning.objectives import Outcome, Played, Score
+from qpsafe.sim.tuning.objectives import Played, Score
 from qpsafe.sim.tuning.space import Point
 
 
@@ -43,11 +43,6 @@ class Trial(NamedTuple):
         """For JSON."""
         return self._asdict() | {"score": self.score._asdict()}
 
-    @classmethod
-    def from_dict(cls, said: Mapping[str, Any]) -> Trial:
-        """The inverse of `to_dict`."""
-        return cls(**{**said, "score": Score(**said["score"])})
-
 
 def front_of(trials: Sequence[Trial]) -> list[Trial]:
     """The trials on the front, from little harm to little work lost."""
@@ -58,8 +53,3 @@ def front_of(trials: Sequence[Trial]) -> list[Trial]:
 def played_to_dict(played: Played) -> dict[str, list[list[Any]]]:
     """For JSON."""
     return {str(lag): [list(outcome) for outcome in runs] for lag, runs in played.items()}
-
-
-def played_from_dict(said: Mapping[str, Sequence[Sequence[Any]]]) -> Played:
-    """The inverse of `played_to_dict`."""
-    return {int(lag): [Outcome(*outcome) for outcome in runs] for lag, runs in said.items()}

@@ -79,7 +79,7 @@ class Plant:
             q: Where it starts, (n,) [rad]; default the robot's home.
 
         Raises:
-            ConfigurationError: A value is out of range.
+            ConfigurationError: A value is out of range, or its motors are too weak to hold the robot where it starts.
         """
         step = scene.model.opt.timestep
         self._substeps = round(period / step) if math.isfinite(period) else 0
@@ -103,6 +103,7 @@ class Plant:
         self.data: Any = mujoco.MjData(scene.model)
         self._acceleration, self._force = np.zeros((2, scene.model.nv))
         self.reset(scene.robot.home if q is None else q)
+        self._check_strength()
 
     def reset(self, q: ArrayLike) -> None:
         """Put the robot at rest at q, (n,) [rad], at time 0, and hold it there.
@@ -123,6 +124,16 @@ class Plant:
         self._age = 0
         self._steps = 0
         self._pending: deque[tuple[int, Array, Array]] = deque()
+
+    def _check_strength(self) -> None:
+        """Refuse a robot that would sink where it starts, whatever it is told."""
+        held = np.abs(self.data.qfrc_bias - self.data.qfrc_passive)[self.scene.v_addresses]
+        most = np.abs(self.torque_limits).min(axis=1)
+        for name, needed, limit in zip(self.scene.robot.joint_names, held, most, strict=True):
+            if needed > limit * (1.0 + 1e-9):
+                found = f"{limit:.3g} N m"
+                expected = f"at least {needed:.3g} N m, which hold it in the posture where it starts"
+                raise ConfigurationError(self.scene.robot.model_path, f"torque of joint {name}", found, expected)
 
     @property
     def q(self) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,6 @@ from qpsafe.cli.campaign.options import (
     Json,
     Typed,
     Workers,
-    case_of,
     counting,
     executor_at,
     one_trial,
@@ -60,19 +60,18 @@ def limit(
     from qpsafe.sim.campaign.limit.search import EVALUATIONS
 
     tries = evaluations or EVALUATIONS
-    if Path(trial).is_dir():
-        if plan is not None or any(value is not None for value in typed.values()):
-            said = [f"--{key}" for key, value in {"file": plan, **typed}.items() if value is not None]
-            raise ConfigurationError(WHERE, said[0], trial, "no options of a plan: a folder has its own")
+    if os.path.isdir(trial):  # unlike Path.is_dir, False for what cannot be a name
+        for key, value in {"file": plan, **typed}.items():
+            if value is not None:
+                raise ConfigurationError(WHERE, f"--{key}", value, "nothing: the folder has its own plan")
         with executor_at(dask) as executor:
             search = {"executor": executor, "workers": workers, "evaluations": tries}
-            _folder(Path(trial), controller or "default", search, screen, json)
+            _folder(Path(trial), "default" if controller is None else controller, search, screen, json)
         return
-    case, _ = case_of(WHERE, trial, ", or a campaign's folder")
-    made, name = one_trial(WHERE, case, plan, typed, controller)
+    one = one_trial(WHERE, trial, plan, typed, controller, ", or a campaign's folder")
     from qpsafe.sim.campaign.limit.limit import limit_of
 
-    found = limit_of(made, case.encounter if case else int(trial), name, tries).limit
+    found = limit_of(one.plan, one.what, one.controller, tries).limit
     if json:
         print_json(found.to_dict())
     else:

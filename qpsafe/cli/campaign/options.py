@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from qpsafe.sim.campaign.plan import Plan
-    from qpsafe.sim.campaign.worst.cases import Case
+    from qpsafe.sim.campaign.worst.cases import Encounter
 
 WORKERS = os.cpu_count() or 1
 
@@ -76,7 +76,8 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
     Args:
         file: The plan, or its file; None for the default one.
         where: The command, for the error.
-        given: Keys of the plan; None where nothing was typed; several names in one word, separated by commas.
+        given: Keys of the plan; None where nothing was typed; several names in one word, separated by commas. A
+            tuple of controllers has the only one of a command that takes one.
 
     Raises:
         ConfigurationError: Names the option, or the file with the line.
@@ -86,7 +87,7 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
     plan = Plan() if file is None else file if isinstance(file, Plan) else load_plan(file)
     typed = {key: value for key, value in given.items() if value is not None}
     for key in ("motions", "controllers"):
-        if key in typed:
+        if isinstance(typed.get(key), str):
             typed[key] = tuple(word.strip() for word in typed[key].split(","))
     for key in ("people", "cell"):
         if key in typed:
@@ -94,7 +95,9 @@ def make_plan(file: Path | Plan | None, where: str = "qpsafe campaign", **given:
     try:
         made = replace(plan, **typed)
     except ConfigurationError as wrong:
-        raise ConfigurationError(where, f"--{wrong.key}", wrong.value, wrong.expected) from None
+        alone = wrong.key == "controllers" and not isinstance(given.get("controllers"), str)
+        option = "controller" if alone else f"--{wrong.key}"
+        raise ConfigurationError(where, option, wrong.value, wrong.expected) from None
     _read_files(made)
     named = "motions" in typed or made.motions != Plan.motions
     return plan_for_its_robot(where, made, named)
@@ -143,36 +146,53 @@ def counting(what: str, screen: Console) -> Iterator[Callable[[int, int], None]]
         yield count
 
 
-def case_of(where: str, text: str, others: str = "") -> tuple[Case | None, str]:
-    """The case of a file and a name for what is written of it; None where the number of a trial is meant.
+class Single(NamedTuple):
+    """One trial, or case, and who plays it.
 
-    Args:
-        where: The command, for the error.
-        text: What was typed.
-        others: What else it may be, for the error.
+    Attributes:
+        plan: Of it, with this controller alone.
+        what: Number of the trial, or the case.
+        controller: Its name.
+        label: For what is written of a case; empty for a trial.
     """
-    from qpsafe.sim.campaign.worst.cases import load_case
 
-    file, _, number = text.rpartition("#")
-    if not number.isdecimal():
-        expected = f"the number of a trial, or FILE.json#K with the number of a case{others}"
-        raise ConfigurationError(where, "TRIAL", text, expected)
-    return (load_case(Path(file), int(number)), f"{Path(file).stem}-{number}") if file else (None, "")
+    plan: Plan
+    what: int | Encounter
+    controller: str
+    label: str = ""
 
 
 def one_trial(
-    where: str, case: Case | None, file: Path | None, typed: Typed, controller: str | None
-) -> tuple[Plan, str]:  # fmt: skip
-    """The plan of one trial, or case, and whose run is meant: the case's controller, or `default`, if nobody is named.
+    where: str, text: str, file: Path | None, typed: Typed, controller: str | None, others: str = ""
+) -> Single:  # fmt: skip
+    """What one trial, or case, is; the case's controller, or `default`, if nobody is named.
 
     Args:
-        where: The command, for the error.
-        case: See `case_of`.
+        where: The command, for errors.
+        text: What was typed of it: a number, or FILE.json#K.
         file: The plan's, None if there is none.
         typed: Options that make a plan.
         controller: Its name, if it was typed.
+        others: What else `text` may be, for the error.
     """
-    if case is not None and file is not None:
+    from qpsafe.sim.campaign.plan import MOST_TRIALS
+    from qpsafe.sim.campaign.worst.cases import check_case, load_case
+
+    path, mark, number = text.rpartition("#")
+    if not number.isdecimal() or (mark and not path):
+        expected = f"the number of a trial, or FILE.json#K with the number of a case{others}"
+        raise ConfigurationError(where, "TRIAL", text, expected)
+    if len(number) > len(str(MOST_TRIALS)) or int(number) >= MOST_TRIALS:  # Python reads no 5,000 digits
+        raise ConfigurationError(where, "TRIAL", text[:40], f"a number from 0 to {MOST_TRIALS - 1}")
+    if not mark:
+        name = "default" if controller is None else controller
+        return Single(make_plan(file, where, **typed, controllers=(name,)), int(number), name)
+    if file is not None:
         raise ConfigurationError(where, "--file", str(file), "none: a case has its plan with it")
-    name = controller or (case.controller if case else "default")
-    return make_plan(case.plan if case else file, **typed, controllers=name), name
+    if typed["motions"] is not None:
+        raise ConfigurationError(where, "--motions", typed["motions"], "none: a case has its motion with it")
+    case = load_case(Path(path), int(number))
+    name = case.controller if controller is None else controller
+    plan = make_plan(case.plan, where, **typed, controllers=(name,))
+    check_case(text, plan, case.encounter)
+    return Single(plan, case.encounter, name, f"{Path(path).stem}-{int(number)}")

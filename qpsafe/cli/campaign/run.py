@@ -30,6 +30,7 @@ from qpsafe.text.json_text import json_text
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from qpsafe.sim.campaign.plan import Plan
     from qpsafe.sim.campaign.runner import Results
 
 
@@ -131,12 +132,11 @@ def _report(
     from qpsafe.sim.campaign.limit.folder import stored_limits
     from qpsafe.sim.campaign.report.page import report_page
     from qpsafe.sim.campaign.report.summary import summary
-    from qpsafe.sim.campaign.speed import engine_speed
 
     kept = trials or folder
     limits = {} if kept is None else stored_limits(kept, results)
     with counting("resampling", screen) as count:
-        found = summary(results, count, engine_speed(results.plan, trials=3).engine, limits)
+        found = summary(results, count, _speed(results.plan), limits)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "report.json", json_text(found) + "\n")
@@ -149,6 +149,16 @@ def _report(
             screen.print(f"written to {folder}: report.html, report.json")
     if found["findings"]:
         raise typer.Exit(1)
+
+
+def _speed(plan: Plan) -> float | None:
+    """Of the engine in this plan's encounters; None where its files have gone since."""
+    from qpsafe.sim.campaign.speed import engine_speed
+
+    try:
+        return engine_speed(plan, trials=3).engine
+    except (ConfigurationError, OSError):
+        return None
 
 
 #: Measures of the printed table, besides contacts.

@@ -15,7 +15,6 @@ from qpsafe.cli.campaign.options import (
     Json,
     Typed,
     Workers,
-    case_of,
     counting,
     executor_at,
     make_plan,
@@ -25,7 +24,6 @@ from qpsafe.cli.campaign.options import (
 from qpsafe.cli.common import console, print_json, write_text
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
-from qpsafe.text.words import file_word
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,14 +47,12 @@ def show(
 ) -> None:
     """Play one trial again in the full MuJoCo scene: a video, and a table of all its ticks."""
     screen = console(json)
-    case, label = case_of("qpsafe campaign show", trial)
-    made, name = one_trial("qpsafe campaign show", case, plan, typed, controller)
-    what = case.encounter if case else int(trial)
+    one = one_trial("qpsafe campaign show", trial, plan, typed, controller)
     from qpsafe.sim.campaign.show import show as play
 
     with counting("ticks", screen) as count:
         shown = play(
-            made, what, name, out, label=label, progress=count,
+            one.plan, one.what, one.controller, out, label=one.label, progress=count,
             notice=lambda text: screen.print(text, style="yellow"),
         )  # fmt: skip
     if json:
@@ -108,14 +104,15 @@ def worst(
     Exit code 1 if the search could not find ten cases nearer than 50 mm that random trials did not.
     """
     screen = console(json)
+    from qpsafe.sim.campaign.digests import file_name_of
     from qpsafe.sim.campaign.worst.cases import cases_to_dict, find_worst
     from qpsafe.sim.campaign.worst.search import WANTED
 
-    made = make_plan(plan, **typed, controllers=controller)
+    made = make_plan(plan, "qpsafe campaign worst", **typed, controllers=(controller,))
     with executor_at(dask) as executor, counting("trials", screen) as count:
         found = find_worst(made, controller, trials, executor, count, workers=workers)
     out.mkdir(parents=True, exist_ok=True)
-    file = out / f"worst-{file_word(controller)}.json"
+    file = out / f"worst-{file_name_of(controller)}.json"
     table = cases_to_dict(made, controller, found)
     write_text(file, json_text(table) + "\n")
     if json:

@@ -1,4 +1,4 @@
-"""`--robot` of the demos: any robot, made ready, with what was chosen for it said in one short list."""
+"""`--robot`: any robot, made ready, with what was chosen for it said in one short list."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qpsafe.cli.common import say
+from qpsafe.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,3 +50,47 @@ def any_robot(where: str, name: str, out: Path, screen: Console, joints: int = 6
     ready = made_ready(where, name, out, joints, in_the_way if picks else None)
     say(screen, f"{ready.robot.name}:", ready.said)
     return ready.robot
+
+
+def ready_name(where: str, name: str, screen: Console, joints: int = 1, sensors: bool = False) -> str:
+    """The name of a robot that is described: a bare model gets what it lacks in `own_folder`, as in the demos.
+
+    Args:
+        where: The command, for errors.
+        name: What was typed.
+        screen: Where it is said what was chosen.
+        joints: How many must carry the tool of one that something is chosen for, at least.
+        sensors: Whether a folder without sensors is not enough: a copy gets some.
+
+    Raises:
+        ConfigurationError: Nothing can be chosen for it.
+    """
+    from qpsafe.robot.loader import find_robot, load_quietly
+
+    if find_robot(name).suffix == ".toml" and not (sensors and load_quietly(name).spots_path is None):
+        return name
+    any_robot(where, name, own_folder(name), screen, joints)
+    return str(own_folder(name) / "robot")
+
+
+def check_stated(where: str, name: str, sensors: bool) -> None:
+    """Refuse a robot of which something would have to be chosen: no real one may drive to what was guessed.
+
+    Args:
+        where: The command, for errors.
+        name: What was typed.
+        sensors: Whether they are in use.
+
+    Raises:
+        ConfigurationError: Its files state no home pose, or no sensors while they are in use.
+    """
+    from qpsafe.robot.loader import load_quietly
+    from qpsafe.robot.robot_file.defaults import HOMELESS
+
+    robot = load_quietly(name)
+    if any(note.startswith(HOMELESS) for note in robot.notes):
+        expected = "a robot whose home pose is stated: `qpsafe robots add` first, and look at what it writes"
+        raise ConfigurationError(where, "--robot", name, expected)
+    if sensors and robot.spots_path is None:
+        expected = "a robot with sensors, as in a spots.toml, or --no-sensors: it would see nobody"
+        raise ConfigurationError(where, "--robot", name, expected)

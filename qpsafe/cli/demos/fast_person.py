@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from qpsafe.cli.common import (
+    Lag,
     LawName,
     ProjectionName,
     RobotName,
@@ -49,7 +50,7 @@ def fast_person(
     projection: Annotated[
         ProjectionName, typer.Option(help="Projection of the hierarchical law.")
     ] = ProjectionName.strict,
-    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s].")] = 0.0,
+    lag: Lag = 0.0,
     sensor: Annotated[SpotSensor, typer.Option(help="What its spots are.")] = SpotSensor.ideal,
     out: Annotated[Path, typer.Option(help="Folder for the results.", callback=output_folder)] = Path(
         "out/demo-fast-person"

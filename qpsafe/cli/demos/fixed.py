@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import (
+    Lag,
     LawName,
     ProjectionName,
     console,
@@ -44,9 +45,7 @@ def fixed(
     ] = ProjectionName.strict,
     solver: Annotated[str | None, typer.Option(help="Solver of the QPs; by default the project's own.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of how the person moves; 0 is nominal.")] = 0,
-    lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
-    ] = 0.0,
+    lag: Lag = 0.0,
     duration: Annotated[
         float | None, typer.Option(min=0.1, max=600.0, help="Length of the run [s]; 60, or the story's.")
     ] = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, console, print_json, progress_bar, say, show_checks, write_text
+from qpsafe.cli.common import Lag, RobotName, console, print_json, progress_bar, say, show_checks, write_text
 from qpsafe.cli.demos.any_robot import any_robot
 from qpsafe.cli.outputs import output_folder
 from qpsafe.text.json_text import json_text
@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 def path(
     robot: RobotName = "irb140",
     seed: Annotated[int, typer.Option(min=0, max=2**53, help="Seed of how the person moves; 0 is nominal.")] = 0,
-    lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
-    ] = 0.0,
+    lag: Lag = 0.0,
     duration: Annotated[
         float | None, typer.Option(min=3.0, max=600.0, help="Length of each run [s]; 45, or the story's.")
     ] = None,

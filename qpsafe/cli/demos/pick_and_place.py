@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qpsafe.cli.common import (
+    Lag,
     LawName,
     ProjectionName,
     RobotName,
@@ -52,9 +53,7 @@ def pick_and_place(
     unchecked: Annotated[
         bool, typer.Option("--unchecked", help="Run a program even if `qpsafe check` rejects it.")
     ] = False,
-    lag: Annotated[
-        float, typer.Option(min=0.0, max=0.1, help="Servo lag of the plant [s]; EGM has 0.01 to 0.02.")
-    ] = 0.0,
+    lag: Lag = 0.0,
     law: Annotated[LawName, typer.Option(help="Control law.")] = LawName.hierarchical,
     projection: Annotated[
         ProjectionName,

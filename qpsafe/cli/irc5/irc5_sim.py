@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, SensorName, console, load_named, print_json, write_text
-from qpsafe.cli.irc5.idle import SIMULATED, refuse_unused
+from qpsafe.cli.common import Lag, RobotName, SensorName, console, load_named, print_json, write_text
 from qpsafe.cli.irc5.stream import Experiment
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
@@ -28,7 +27,6 @@ WHERE = "qpsafe irc5-sim"
 
 
 def irc5_sim(
-    context: typer.Context,
     experiment: Annotated[
         Experiment, typer.Option(help="Experiment that is played around the robot.")
     ] = Experiment.fixed,
@@ -58,7 +56,7 @@ def irc5_sim(
     comm_timeout: Annotated[float, typer.Option(min=0.004, help="CommTimeout [s].")] = 1.0,
     cond_time: Annotated[float, typer.Option(min=0.004, help="CondTime [s]; by default infinite.")] = math.inf,
     robot_ramp_in: Annotated[float, typer.Option(min=0.0, help="RampInTime [s].")] = 0.05,
-    lag: Annotated[float, typer.Option(min=0.0, max=0.1, help="Servo lag [s].")] = 0.012,
+    lag: Lag = 0.012,
     retry: Annotated[
         float, typer.Option(min=0.0, help="Time after which RAPID restarts EGM when it has timed out [s].")
     ] = 1.0,
@@ -93,13 +91,12 @@ def irc5_sim(
     Faults are counted from the first answer. Distances of the simulated spots are sent along.
     """
     bad = span("--faulty", faulty)
-    refuse_unused(context, SIMULATED)
     screen = console(json)
     screen.print("Loading ...", style="dim")
     from qpsafe.irc5.process import realtime
 
     realtime.one_thread()
-    from qpsafe.cli.demos.any_robot import any_robot, own_folder
+    from qpsafe.cli.demos.any_robot import ready_name
     from qpsafe.irc5.process.requests import Requests
     from qpsafe.irc5.transport.addresses import host_address
     from qpsafe.irc5.transport.axes import axes_of_robot
@@ -132,9 +129,7 @@ def irc5_sim(
     )
     if lockstep and todo:
         raise ConfigurationError(WHERE, "--lock-step", "with faults", "no faults: it waits for answers")
-    found = load_named(robot, screen)
-    if found.spots_path is None:
-        found = any_robot(WHERE, robot, own_folder(robot), screen)
+    found = load_named(ready_name(WHERE, robot, screen, 6, sensors=True), screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
     exchange = UdpExchange(

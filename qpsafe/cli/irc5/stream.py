@@ -12,8 +12,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
-from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json, refuse_idle
-from qpsafe.cli.irc5.idle import BLIND, STREAM, refuse_unused
+from qpsafe.cli.common import LawName, ProjectionName, RobotName, console, load_named, make_law, print_json
 from qpsafe.cli.outputs import output_file
 from qpsafe.errors import ConfigurationError
 
@@ -42,7 +41,6 @@ class Acknowledge(StrEnum):
 
 
 def stream(
-    context: typer.Context,
     robot: RobotName = "irb140",
     host: Annotated[str, typer.Option(help="Address or interface that the robot sends to.")] = ("127.0.0.1"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its UDP port; 0 for any free one.")] = 6510,
@@ -107,8 +105,6 @@ def stream(
 
     No safety function: keep the robot's own stops and limits independent of this program. SIGUSR1 acknowledges a stop.
     """
-    refuse_idle(context, "web")
-    refuse_unused(context, STREAM)
     from qpsafe.irc5.process import realtime
     from qpsafe.irc5.process.outlet import Outlet
     from qpsafe.irc5.process.requests import Requests
@@ -122,6 +118,7 @@ def stream(
         screen = console(json)
         screen.file = cast("IO[str]", spoken if json else written)
         screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
+        from qpsafe.cli.demos.any_robot import check_stated, ready_name
         from qpsafe.cli.irc5.stream_report import result_of, show
         from qpsafe.cli.irc5.stream_speaker import Speaker
         from qpsafe.irc5.distances import SensorInput
@@ -136,15 +133,17 @@ def stream(
         from qpsafe.irc5.transport.event_output import EventOutput
 
         checked = _Checked(unchecked, sensors, screen)
+        if experiment is None:
+            check_stated("qpsafe stream", robot, sensors)
+        else:  # a simulation, of what irc5-sim plays
+            robot = ready_name("qpsafe stream", robot, screen, 6, sensors=True)
         controller = _controller(robot, program, cell, experiment, make_law(law, projection), checked)
-        blind = not sensors or controller.sensing is None
-        refuse_unused(context, BLIND if blind else ())
         writer = None if log is None else _writer(log, controller.robot.nq)
         if writer is not None:
             stack.enter_context(writer)
         output = EventOutput(events) if events else None
         inlet: SensorInput | None = None
-        if not blind:
+        if sensors:
             assert controller.spots is not None
             inlet = SensorInput(len(controller.spots), sensor_host, sensor_port)
             stack.callback(inlet.close)
@@ -154,7 +153,7 @@ def stream(
         axes = axes_of_robot(controller.robot)
         streamer = EgmStreamer(session_limits(controller), host, port, rules, peer, names, axes)
         stack.callback(streamer.close)
-        warm_up(controller, blind)
+        warm_up(controller, not sensors)
         dog = stack.enter_context(Watchdog(watchdog, 1.0, priority + 1 if real_time else 0)) if watchdog else None
         if requests.leave:
             raise typer.Exit(130)
@@ -171,7 +170,7 @@ def stream(
         supervisor = Supervisor(on_transition=speaker.say)
         lets = LoopRules(silence=silence, manual=acknowledge is Acknowledge.manual)
         loop = StreamLoop(controller, streamer.session, supervisor, lets)
-        _announce(screen, grants, streamer.address, inlet, blind)
+        _announce(screen, grants, streamer.address, inlet)
 
         def on_tick(tick: Tick | None) -> None:
             if writer is not None and tick is not None:
@@ -243,18 +242,15 @@ def _controller(
     from qpsafe.tasks.program_file import load_program
     from qpsafe.tasks.trajectory import FixedPose
 
-    screen = console(True) if checked is None else checked.screen
-    found = load_named(robot, screen)
+    checked = checked or _Checked(screen=console(True))
+    found = load_named(robot, checked.screen)
     if experiment is not None:
         if program is not None or cell is not None:
             raise ConfigurationError(
                 "qpsafe stream", "--experiment", experiment.value, "no --program, no --cell with it"
             )
-        from qpsafe.cli.demos.any_robot import any_robot, own_folder
         from qpsafe.sim.experiments.by_name import experiment_loop
 
-        if found.spots_path is None:
-            found = any_robot("qpsafe stream", robot, own_folder(robot), screen)
         controller: SafetyController = experiment_loop(experiment.value, found, law)[0].controller
         return controller
     known = () if cell is None else load_cell(cell)
@@ -264,7 +260,6 @@ def _controller(
         goal = load_program(program, found)
         tool = goal.frame
     if program is not None or known:
-        checked = checked or _Checked()
         result = check_path(found, goal, frame=tool, known=known, sensors=checked.sensors)
         refuse_or_warn("qpsafe stream", program, result, checked.unchecked, checked.screen)
     return SafetyController(found, [PositionTask(tool, goal), OrientationTask(tool, goal)], law, known=known)
@@ -279,14 +274,11 @@ def _grants(real_time: bool, priority: int, threads: list[int]) -> list[Grant]:
     return [*asked, realtime.freeze_garbage()]
 
 
-def _announce(
-    screen: Any, grants: list[Grant], address: tuple[str, int], inlet: SensorInput | None, blind: bool
-) -> None:
+def _announce(screen: Any, grants: list[Grant], address: tuple[str, int], inlet: SensorInput | None) -> None:
     for grant in grants:
         screen.print(grant.line, style="dim" if grant.granted else "yellow", highlight=False)
-    if blind:
+    if inlet is None:
         screen.print("no sensors: the robot sees nobody", style="bold yellow")
     else:
-        assert inlet is not None
         screen.print(f"waiting for distances at {inlet.address[0]}:{inlet.address[1]}", highlight=False)
     screen.print(f"waiting for the robot at {address[0]}:{address[1]}; Ctrl-C ramps out and leaves", highlight=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from qpsafe.cli.common import console, finite, print_json, write_text
+from qpsafe.cli.common import console, print_json, write_text
 from qpsafe.cli.outputs import DRAWN, keep_apart, output_file, try_file
 from qpsafe.extras import require
 
@@ -33,9 +33,7 @@ def calibrate(
         Path | None,
         typer.Option(help="Also draw curves and residuals to this PNG file.", callback=output_file(*DRAWN)),
     ] = None,
-    tolerance: Annotated[
-        float, typer.Option(min=0.0, help="Tolerance that 95 % of the pairs must meet [m].", callback=finite)
-    ] = 0.01,
+    tolerance: Annotated[float, typer.Option(min=0.0, help="Tolerance that 95 % of the pairs must meet [m].")] = 0.01,
     any_sensor: Annotated[
         bool, typer.Option("--any-sensor", help="Accept voltages unlike those of a Sharp GP2Y0A02YK.")
     ] = False,

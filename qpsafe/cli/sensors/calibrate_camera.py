@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from qpsafe.cli.common import RobotName, console, finite, load_named, print_json, write_text
+from qpsafe.cli.common import RobotName, console, load_named, print_json, write_text
 from qpsafe.cli.outputs import keep_apart, output_file
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def calibrate_camera(
         bool, typer.Option("--guess", help="Begin with the pose in the file, right within 0.2 m and 20 degrees.")
     ] = False,
     tolerance: Annotated[
-        float, typer.Option(min=0.0, help="Largest root mean square residual along the rays [m].", callback=finite)
+        float, typer.Option(min=0.0, help="Largest root mean square residual along the rays [m].")
     ] = 0.03,
     out: Annotated[
         Path | None,
@@ -40,7 +40,7 @@ def calibrate_camera(
     Exit code 1, and nothing is written, if the residual is above the tolerance, or if the images do not tell the pose:
     says which direction they leave open.
     """
-    own = ("CELL, which --write writes into", None if write else cell)
+    own = ("CELL, which --write writes into", cell)
     keep_apart("qpsafe calibrate-camera", ("FILE", file), own, ("--out", out))
     screen = console(json)
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")

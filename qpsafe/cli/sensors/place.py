@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import re
+import shlex
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -108,8 +110,8 @@ def place(
     count = spots or min(20, len(found) if limits is None else limits.room())
     check_spots(count, len(found), limits)
     regions = counted(len(machine.regions), "region")
-    text = f"{counted(len(found), 'node')}, {1e3 * found.spacing:.1f} mm apart, on {regions}"
-    screen.print(text, style="dim")
+    apart = f"{1e3 * found.spacing:.1f} mm apart"
+    screen.print(f"{counted(len(found), 'node')}, {apart}, on {regions}", style="dim")
     simulation = MonteCarlo(machine, found, seed=seed, radius=radius, pedestal=pedestal)
     samples = []
     with _executor(workers) as executor, progress_bar(screen) as progress:
@@ -141,9 +143,12 @@ def place(
     if pictures:
         _draw(machine, found, chosen, out, screen)
     write_text(out / "report.json", json_text(report) + "\n")
-    remark = _remark(machine.title, result, _command(context), pairs)
     file = PATTERN.format(sensor.value) if found.sensor.is_array else "spots.toml"
-    write_text(out / file, spots_toml(found, chosen.tolist(), remark))
+
+    def text(command: str) -> str:
+        return spots_toml(found, chosen.tolist(), _remark(machine.title, result, command, pairs))
+
+    write_text(out / file, with_words(_command(context), text))
     if json:
         print_json(report)
     else:
@@ -189,22 +194,39 @@ def _draw(machine: Any, found: Any, chosen: Any, out: Path, screen: Console) -> 
 _BESIDES = ("out", "json", "pictures", "workers")
 
 
-def _command(context: typer.Context) -> str:
-    """The command that makes the placement again: the options that were given."""
-    words = ["qpsafe place"]
+def _command(context: typer.Context) -> list[str]:
+    """The words of the command that makes the placement again: the options that were given."""
+    words, last = ["qpsafe", "place"], list[str]()
     for parameter in context.command.params:
         name = parameter.name or ""
         given = getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"
         if not given or name in _BESIDES:
             continue
         value = getattr(context.params[name], "value", context.params[name])
-        if parameter.param_type_name == "argument":
+        if parameter.param_type_name == "argument" and str(value).startswith("-"):
+            last = ["--", str(value)]
+        elif parameter.param_type_name == "argument":
             words.append(str(value))
         elif isinstance(value, bool):
             words.append((parameter.opts if value else parameter.secondary_opts)[0])
         else:
-            words.append(f"{parameter.opts[0]} {value}")
-    return " ".join(words)
+            words += [parameter.opts[0], str(value)]
+    return words + last
+
+
+def with_words(words: Sequence[str], text: Callable[[str], str]) -> str:
+    """A text that quotes a command for a shell and breaks lines, which no word of the command is broken by.
+
+    Args:
+        words: Of the command.
+        text: Makes the text of the command. Signs nobody writes stand for its words meanwhile, as long as a line takes.
+    """
+    quoted = [shlex.quote(re.sub(r"[\x00-\x1f\x7f]", " ", word)) for word in words]
+    signs = [chr(0xE000 + k) * min(len(word), 100) for k, word in enumerate(quoted)]
+    made = text(" ".join(signs))
+    for sign, word in zip(signs, quoted, strict=True):
+        made = made.replace(sign, word)
+    return made
 
 
 def _remark(title: str, result: Study, command: str, pairs: int) -> str:

@@ -22,6 +22,7 @@ from qpsafe.sim.campaign.trials.recording import STATUSES, Recording
 from qpsafe.sim.campaign.trials.senses import Senses
 from qpsafe.sim.campaign.trials.servo import DT, Servo
 from qpsafe.tasks.rotation import log3
+from qpsafe.text.given import flag, numbers
 from qpsafe.tick import BAD_INPUT, OK
 
 require("gym", "the environment", "gymnasium")
@@ -87,11 +88,11 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         if sensor not in ("ideal", "sharp"):
             raise ConfigurationError("EncounterEnv", "sensor", sensor, "ideal or sharp")
         self._plan = Plan(robot=robot, motions=(motion,), sensor=sensor, lag=lag, people=people, controllers=("none",))
-        self._stop_at_contact = stop_at_contact
+        self._stop_at_contact = flag("EncounterEnv", "stop_at_contact", stop_at_contact)
         self._told: Tick | None = None
-        self._k, self._time, self._touched = 0, 0.0, False
         self._rows: list[tuple[Any, ...]] = []
         self._begin(0)
+        self._over = True  # until it is reset
         arm, k = self.station.robot, len(self.station.spots)
         self._limits = JointLimits.of(arm, DT)
         self._range = self.station.spots.range_max
@@ -138,9 +139,13 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         """Move for a tick of 4 ms.
 
         Raises:
-            ConfigurationError: The action is not (n,).
+            ConfigurationError: The action is no array (n,) of real numbers; or no encounter has begun, or it ended.
         """
-        wish = np.asarray(action, dtype=float)
+        if self._over:
+            raise ConfigurationError(
+                "EncounterEnv", "step", "no encounter", "reset() first: none has begun, or it ended"
+            )
+        wish = numbers("EncounterEnv", "action", action, f"{len(self._command)} real numbers", ndim=1)
         if wish.shape != self._command.shape:
             raise ConfigurationError("EncounterEnv", "action", wish.shape, f"an action of shape {self._command.shape}")
         usable = bool(np.isfinite(wish).all())
@@ -164,11 +169,12 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         self._touched |= touched
         terminated = touched and self._stop_at_contact
         truncated = self._k >= len(tracks) and not terminated
+        self._over = terminated or truncated
         reward = float(working) - HARM * max(1.0 - max(distance, 0.0) / CAREFUL, 0.0) - TOUCH * touched
         info: dict[str, Any] = {
             "distance": distance, "contact": self._touched, "outside_limits": outside, "bad_action": not usable
         }  # fmt: skip
-        if terminated or truncated:
+        if self._over:
             info["measures"] = self.measures()
         return observation, reward, terminated, truncated, info
 
@@ -197,7 +203,7 @@ class EncounterEnv(gymnasium.Env[Observation, Array]):
         self._senses = Senses(place, self._met.tracks, self._plan.sensor, seed)
         self._servo = Servo(place.start, self._plan.lag)
         self._q, self._command = place.start.copy(), np.zeros(place.robot.nq)
-        self._k, self._time, self._touched = 0, 0.0, False
+        self._k, self._time, self._touched, self._over = 0, 0.0, False, False
         self._told, self._rows = None, []
 
     def _advance(self) -> bool:

@@ -13,15 +13,16 @@ from typing import Any
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.alone import alone_in
+from qpsafe.sim.campaign.digests import file_name_of
 from qpsafe.sim.campaign.executors import answers, crew_at_work
 from qpsafe.sim.campaign.limit.row import Limit, limit_from
 from qpsafe.sim.campaign.limit.search import EVALUATIONS
-from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.plan import Plan, names_only
 from qpsafe.sim.campaign.runner import Results, stored_results
 from qpsafe.sim.campaign.store import Store
 from qpsafe.sim.campaign.trials.rows import of_controller
-from qpsafe.text.json_text import json_text
-from qpsafe.text.words import file_word
+from qpsafe.text.json_text import json_text, plain
+from qpsafe.text.whole_file import whole_file
 
 FORMAT = "qpsafe campaign limit 1"
 
@@ -125,7 +126,7 @@ def _one(limit: LimitFunction, plan: Plan, controller: str, evaluations: int, tr
 
 
 def _file(folder: Path, controller: str) -> Path:
-    return folder / f"limit-{file_word(controller)}.jsonl"
+    return folder / f"limit-{file_name_of(controller)}.jsonl"
 
 
 def _head(results: Results, controller: str, evaluations: int | None) -> dict[str, Any]:
@@ -136,9 +137,9 @@ def _head(results: Results, controller: str, evaluations: int | None) -> dict[st
         controller: Whose limits.
         evaluations: Motions that are tried in a trial.
     """
-    campaign = {key: value for key, value in results.plan.to_dict().items() if key != "trials"}
     code = None if evaluations is None else sha256(b"".join(p.read_bytes() for p in _sources())).hexdigest()
-    return {"format": FORMAT, "controller": controller, "plan": campaign, "evaluations": evaluations, "code": code}
+    plan = results.plan.named()
+    return {"format": FORMAT, "controller": controller, "plan": plan, "evaluations": evaluations, "code": code}
 
 
 def _sources() -> list[Path]:
@@ -151,9 +152,8 @@ def _line(value: Any) -> str:
 
 def _write(file: Path, head: dict[str, Any], limits: Any) -> None:
     ordered: Sequence[Limit] = sorted(limits, key=lambda item: item.trial)
-    part = file.with_name(f".{file.name}.part")
-    part.write_text(_line(head) + "".join(_line(item._asdict()) for item in ordered), encoding="utf-8")
-    part.replace(file)
+    with whole_file(file) as part:
+        part.write_text(_line(head) + "".join(_line(item._asdict()) for item in ordered), encoding="utf-8")
 
 
 def _read(file: Path, head: dict[str, Any]) -> list[Limit]:
@@ -166,7 +166,9 @@ def _read(file: Path, head: dict[str, Any]) -> list[Limit]:
     except (OSError, ValueError, TypeError, AttributeError) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ConfigurationError(file, "file", problem, "limits; if you remove the file they are found again") from None
-    for key, value in json.loads(json_text(head)).items():
+    if isinstance(there.get("plan"), dict):
+        there["plan"] = names_only(there["plan"])  # older ones have paths
+    for key, value in plain(head).items():
         if value is not None and there.get(key) != value:
             expected = f"{value!r}, as now: remove the file, and they are found again"
             raise ConfigurationError(file, key, there.get(key), expected)

@@ -10,7 +10,11 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
+from importlib.util import module_from_spec, spec_from_file_location
+from itertools import count
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +28,9 @@ from qpsafe.laws.hierarchical import HierarchicalLaw
 from qpsafe.laws.nullspace import NullspaceLaw
 from qpsafe.laws.weighted import WeightedLaw
 from qpsafe.sensing.rules import SensingRules
+from qpsafe.sim.campaign.digests import State, state_of
 from qpsafe.sim.campaign.opponents.as_in_paper import AS_IN_PAPER
+from qpsafe.sim.campaign.opponents.fingerprint import fingerprint
 from qpsafe.sim.campaign.opponents.scaling import PathScaling
 from qpsafe.sim.campaign.opponents.separated import Separated
 from qpsafe.sim.campaign.opponents.stop import StopOnly
@@ -66,12 +72,14 @@ class Opponent(NamedTuple):
         sentence: What it is, for the report.
         make: A fresh one for a station; called once a trial.
         sight: ``spots``, ``points`` (perfect sight) or ``nothing``.
+        edition: Tells `make` from another one that had this name before.
     """
 
     name: str
     sentence: str
     make: Callable[[Station], Controls]
     sight: str = SPOTS
+    edition: str = ""
 
 
 def _with(law: Any = None, **parts: Any) -> Callable[[Station], SafetyController]:
@@ -112,6 +120,9 @@ _BUNDLED = (
     Opponent("default", "SafetyController as it comes", _with()),
 )  # fmt: skip
 _known: dict[str, Opponent] = {entry.name: entry for entry in _BUNDLED}
+_editions = count()
+#: Of modules that were imported for a controller: what their files were then.
+_read: dict[str, State] = {}
 
 
 def names() -> tuple[str, ...]:
@@ -134,7 +145,17 @@ def register(name: str, make: Callable[[Station], Controls], sentence: str = "a 
         raise ConfigurationError("campaign", "controllers", name, "a new name, without ':' and " + PERFECT)
     if not callable(make):
         raise ConfigurationError("campaign", f"controllers.{name}", make, "a function of the station")
-    _known[name] = Opponent(name, sentence, make)
+    _known[name] = Opponent(name, sentence, make, edition=str(next(_editions)))
+
+
+def maker_digest(name: str) -> str | None:
+    """64 hexadecimal digits that stand for what was registered under a name; None for the bundled ones, who are code.
+
+    Raises:
+        ConfigurationError: It cannot be told from another one.
+    """
+    found = _known.get(name)
+    return None if found is None or found in _BUNDLED else fingerprint(name, found.make)
 
 
 def opponent(name: str) -> Opponent:
@@ -153,21 +174,12 @@ def opponent(name: str) -> Opponent:
     return found
 
 
-@cache
 def _imported(place: str) -> Opponent:
-    module, _, function = place.rpartition(":")
+    """A user's own, as the file says now: one that was edited since is read again."""
+    name, _, function = place.rpartition(":")
     try:
-        if module.endswith(".py"):
-            from importlib.util import module_from_spec, spec_from_file_location
-
-            spec = spec_from_file_location(Path(module).stem, module)
-            if spec is None or spec.loader is None:
-                raise ImportError(f"{module} is no Python file")
-            loaded = module_from_spec(spec)
-            spec.loader.exec_module(loaded)
-        else:
-            loaded = importlib.import_module(module)
-        make = getattr(loaded, function)
+        module, edition = _from_file(name) if name.endswith(".py") else _from_module(name)
+        make = getattr(module, function)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a user's module may raise anything, even end the process
@@ -176,4 +188,32 @@ def _imported(place: str) -> Opponent:
     if not callable(make):
         raise ConfigurationError("campaign", "controllers", place, "a function of the station")
     said = make.__doc__.strip() if isinstance(make.__doc__, str) else ""
-    return Opponent(place, (said or "a controller of the user's").splitlines()[0], make)
+    sentence = (said or "a controller of the user's").splitlines()[0]
+    return Opponent(place, sentence, make, edition=edition)
+
+
+def _from_file(path: str) -> tuple[ModuleType, str]:
+    source = Path(path).read_bytes()
+    return _executed(path, source), sha256(source).hexdigest()
+
+
+@cache
+def _executed(path: str, source: bytes) -> ModuleType:
+    """A module of its own; not by the cache of bytecode, which takes two files of one second and size for the same."""
+    spec = spec_from_file_location(Path(path).stem, path)
+    if spec is None:
+        raise ImportError(f"{path} is no Python file")
+    loaded = module_from_spec(spec)
+    exec(compile(source, path, "exec", dont_inherit=True), loaded.__dict__)
+    return loaded
+
+
+def _from_module(name: str) -> tuple[ModuleType, str]:
+    module = importlib.import_module(name)
+    origin = getattr(module, "__file__", None) or ""
+    now = state_of(origin)
+    if _read.setdefault(name, now) != now:
+        # as importlib.reload, see above
+        exec(compile(Path(origin).read_bytes(), origin, "exec", dont_inherit=True), module.__dict__)
+        _read[name] = now
+    return module, str(now)

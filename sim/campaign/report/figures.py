@@ -68,10 +68,12 @@ def _box(axis: Axes, found: dict[str, Any], name: str, colour: str, label: str) 
     from matplotlib.patches import Rectangle
 
     least, most = found["intervals"]["progress_mean"]
-    if least <= 0.0:
+    if least <= 0.0 or found["progress_mean"] <= 0.0:
         return  # its cycle has no end
     low, high = (100.0 * limit for limit in found["intervals"][name])
     x, y = 1.0 / found["progress_mean"], 100.0 * found[name] / found["trials"]
+    if not least > 0.0:  # NaN: so few trials that there are none
+        least = most = found["progress_mean"]
     size = 1.0 / least - 1.0 / most, high - low
     axis.add_patch(Rectangle((1.0 / most, low), *size, facecolor=colour, alpha=0.22, linewidth=0))
     axis.add_patch(Rectangle((1.0 / most, low), *size, fill=False, edgecolor=colour, linewidth=0.8))

@@ -28,9 +28,13 @@ def findings(rows: dict[str, Columns]) -> list[str]:
     """
     found = []
     for name, mine in rows.items():
-        excess = np.nan_to_num(mine["limit_excess"], nan=np.inf)
+        excess = np.where(np.isnan(mine["limit_excess"]), np.inf, mine["limit_excess"])
         if (passed := int((excess > TOLERANCE).sum())) > 0:
-            found.append(f"{name} passes a joint limit in {counted(passed, 'trial')}, by {100 * excess.max():.2g} %")
+            most = excess[np.isfinite(excess)].max(initial=0.0)
+            by = f", by {100 * most:.2g} %" if most > TOLERANCE else ""
+            wild = int((~np.isfinite(excess)).sum())
+            more = f", in {counted(wild, 'trial')} by a command that is no number" if wild else ""
+            found.append(f"{name} passes a joint limit in {counted(passed, 'trial')}{by}{more}")
         if (bad := int((mine["bad_ticks"] > 0).sum())) > 0:
             found.append(f"{name} gives a bad command in {counted(bad, 'trial')}")
     if NOBODY not in rows:

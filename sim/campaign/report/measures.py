@@ -90,8 +90,9 @@ class FigureMeasure(NamedTuple):
         """Difference of a comparison of a summary and its limits, as shown."""
         return self.shown(item["difference"], True), self._limits(item["interval"])
 
-    def _limits(self, interval: Sequence[float]) -> str:
-        return " to ".join(self.shown(limit) for limit in interval)
+    def _limits(self, interval: Sequence[float | None]) -> str:
+        known = [self.shown(limit) for limit in interval if limit is not None and limit == limit]  # no NaN
+        return " to ".join(known) or "no limits"
 
     def shown(self, value: float, signed: bool = False) -> str:
         """A value in its unit as shown, without the unit."""
@@ -168,20 +169,20 @@ FIGURES = (
     ),
     FigureMeasure(
         "under_sp_mean", "under S_p", "s", 1.0, 2, "time below the separation S_p while the robot moved, mean",
-        _or_zero("under_sp"), MEAN,
+        _column("under_sp"), MEAN,
     ),
     FigureMeasure(
         "progress_mean", "progress", "%", 1e2, 1, "path time done over path time that is done without people, mean",
-        _or_zero("progress"), MEAN,
+        _column("progress"), MEAN,
     ),
     FigureMeasure(
         "lost_time_mean", "lost time", "s", 1.0, 2, "path time that is done without people less path time done, mean",
-        _or_zero("lost_time"), MEAN, True,
+        _column("lost_time"), MEAN, True,
     ),
-    FigureMeasure("stops_mean", "stops", "1", 1.0, 2, "stops in a trial, mean", _or_zero("stops"), MEAN),
+    FigureMeasure("stops_mean", "stops", "1", 1.0, 2, "stops in a trial, mean", _column("stops"), MEAN),
     FigureMeasure(
         "suspensions_mean", "suspensions", "1", 1.0, 2, "suspensions of the work in a trial, mean",
-        _or_zero("suspensions"), MEAN, True,
+        _column("suspensions"), MEAN, True,
     ),
     FigureMeasure(
         "path_error_p95", "path error, 95 %", "mm", 1e3, 1, "largest distance off the path in work: 95 % have less",
@@ -189,7 +190,7 @@ FIGURES = (
     ),
     FigureMeasure(
         "reversals_mean", "reversals", "1", 1.0, 1, "turns of joints' speeds in a trial, the path's own too, mean",
-        _or_zero("reversals"), MEAN,
+        _column("reversals"), MEAN,
     ),
 )  # fmt: skip
 

@@ -6,7 +6,7 @@ is judged trial by trial. Nothing here depends on the order of the trials but th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement.statistics import clopper_pearson
+from qpsafe.sim.campaign.report.resamples import Ranks, unit_of, weights_of
+from qpsafe.sim.campaign.report.swaps import few, least_p, swapped_p
 
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
 RESAMPLES = 10_000
-#: Resamples whose weights are in memory at the same time, times trials: 8 bytes each.
-_BLOCK = 4_000_000
+#: Fewer trials have no limits at 95 %: their range itself holds a median with a probability of 1 - 2^(1-n) only.
+LEAST = 6
 
 
 class Share(NamedTuple):
@@ -115,7 +117,7 @@ class Statistic(NamedTuple):
     def of(self, values: Array) -> float:
         """Its value for trials (n,)."""
         if self.quantile is None:
-            unit = _unit(values)
+            unit = unit_of(values)
             return float(np.rint(values / unit).sum()) * unit / len(values)
         return float(np.quantile(values, self.quantile, method="inverted_cdf"))
 
@@ -129,9 +131,9 @@ class Estimate(NamedTuple):
 
     Attributes:
         value: From the trials.
-        low: Lower limit at 95 %.
-        high: Upper limit at 95 %.
-        p: Of differences: two-sided p-value of no difference, never below 2/(resamples + 1); else None.
+        low: Lower limit at 95 %; NaN of fewer trials than `LEAST`.
+        high: Upper limit at 95 %; NaN likewise.
+        p: Of differences: two-sided p-value of no difference, see `Bootstrap`; else None.
     """
 
     value: float
@@ -144,7 +146,8 @@ class Bootstrap:
     """Resamples of trials, the same ones for every controller and figure: that is what pairs them.
 
     Limits are percentiles of the resampled figures. A difference's p-value inverts them: twice the smaller share of
-    resamples on either side of zero, counting the observation itself as one on both.
+    resamples on either side of zero, counting the observation itself as one on both; never below `least_p`. Of few
+    trials it is that of swaps, see `qpsafe.sim.campaign.report.swaps`.
 
     Args:
         values: A column for each controller and figure: name -> one finite value a trial.
@@ -177,16 +180,16 @@ class Bootstrap:
         self.drawn: dict[tuple[str, Statistic], Array] = {
             (name, item): np.empty(resamples) for name in values for item in wanted[name]
         }
-        trials = lengths.pop() if lengths else 1
+        self._trials = trials = lengths.pop() if lengths else 1
         means = [key for key in self.drawn if key[1].quantile is None]
-        ranked = [(key, _Ranks(values[key[0]], key[1].quantile)) for key in self.drawn if key[1].quantile is not None]
+        ranked = [(key, Ranks(values[key[0]], key[1].quantile)) for key in self.drawn if key[1].quantile is not None]
         # one matrix product gives all means, and how many of a resample lie before each window of ranks
-        units = [_unit(values[name]) for name, _ in means]
+        units = [unit_of(values[name]) for name, _ in means]
         columns = [np.rint(values[key[0]] / unit) for key, unit in zip(means, units, strict=True)]
         columns += [ranks.before for _, ranks in ranked]
         products = np.stack(columns) if columns else np.empty((0, trials))
         done = 0
-        for weights in _weights(trials, resamples, seed):
+        for weights in weights_of(trials, resamples, seed):
             rows = slice(done, done + weights.shape[1])
             sums = products @ weights
             for k, key in enumerate(means):
@@ -199,7 +202,7 @@ class Bootstrap:
 
     def estimate(self, name: str, item: Statistic) -> Estimate:
         """A figure with its limits."""
-        return Estimate(item.of(self.values[name]), *_limits(self.drawn[name, item]))
+        return Estimate(item.of(self.values[name]), *self._limits(self.drawn[name, item]))
 
     def difference(self, first: str, second: str, item: Statistic) -> Estimate:
         """First less second, with limits and p-value.
@@ -210,76 +213,20 @@ class Bootstrap:
             item: Statistic of both.
         """
         drawn = self.drawn[first, item] - self.drawn[second, item]
-        value = item.of(self.values[first]) - item.of(self.values[second])
-        beside = min((drawn <= 0.0).sum(), (drawn >= 0.0).sum())
-        return Estimate(value, *_limits(drawn), min(2.0 * (1.0 + float(beside)) / (1.0 + len(drawn)), 1.0))
+        one, other = self.values[first], self.values[second]
+        if few(one, other, item.quantile):
+            p = swapped_p(one, other, item.quantile, len(drawn))
+        else:
+            beside = min((drawn <= 0.0).sum(), (drawn >= 0.0).sum())
+            p = max(min(2.0 * (1.0 + float(beside)) / (1.0 + len(drawn)), 1.0), least_p(one, other))
+        return Estimate(item.of(one) - item.of(other), *self._limits(drawn), p)
 
-
-def _unit(column: Array) -> float:
-    """A power of two of which a column's values are taken as whole multiples.
-
-    So many bits are left to them that sums over a resample are whole numbers below 2^53: exact, hence the same in every
-    order of summation, by however many threads. A value of n is off by at most n/2^52 of the largest one.
-    """
-    largest = float(np.abs(column).max())
-    bits = 52 - int(np.ceil(np.log2(len(column))))
-    return 2.0 ** (int(np.ceil(np.log2(largest))) - bits) if largest > 1e-200 else 1.0
-
-
-class _Ranks:
-    """Quantiles of resamples of a column, from how often each trial is in them.
-
-    A quantile's rank hardly moves: of a resample, about Q of the n trials lie before rank Q, give or take
-    √(Q (1 - Q/n)). So only a window of ranks, seven such deviations to both sides, is looked at one by one.
-
-    Args:
-        column: One value a trial, (n,).
-        quantile: Which.
-    """
-
-    def __init__(self, column: Array, quantile: float | None) -> None:
-        count = len(column)
-        rank = (quantile or 0.0) * count
-        self.need = max(int(np.ceil(rank - 1e-9)), 1)
-        room = 7.0 * np.sqrt(rank * (1.0 - rank / count)) + 2.0
-        first, end = max(int(rank - room), 0), min(int(rank + room) + 1, count)
-        self.order = np.argsort(column, kind="stable")
-        self.window = slice(first, end)
-        self.rising = column[self.order]
-        self.before = np.zeros(count)  # 1 where a trial's rank is before the window
-        self.before[self.order[:first]] = 1.0
-
-    def quantiles(self, weights: Array, before: Array) -> Array:
-        """Of resamples.
-
-        Args:
-            weights: How often each trial is in each, (n, m).
-            before: How many trials of each lie before the window, (m,).
-        """
-        upto = np.cumsum(weights[self.order[self.window]], axis=0) + before
-        below = (upto < self.need).sum(axis=0)  # ranks of the window before the quantile's
-        outside = (before >= self.need) | (below == len(upto))
-        found = self.rising[self.window][np.where(outside, 0, below)]
-        for k in np.flatnonzero(outside):  # next to never: all ranks
-            found[k] = self.rising[(np.cumsum(weights[self.order, k]) < self.need).sum()]
-        return found
-
-
-def _weights(trials: int, resamples: int, seed: int) -> Iterator[Array]:
-    """How often each trial is in each resample, (trials, some resamples), block by block."""
-    rng = np.random.default_rng(seed)
-    size = max(_BLOCK // trials, 1)
-    for first in range(0, resamples, size):
-        count = min(size, resamples - first)
-        drawn = rng.integers(trials, size=(count, trials)) + trials * np.arange(count)[:, None]
-        found = np.bincount(drawn.ravel(), minlength=count * trials).reshape(count, trials)
-        yield found.T.astype(np.float64, order="C")
-
-
-def _limits(drawn: Array) -> tuple[float, float]:
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(drawn, (tail, 1.0 - tail))
-    return float(low), float(high)
+    def _limits(self, drawn: Array) -> tuple[float, float]:
+        if self._trials < LEAST:
+            return float("nan"), float("nan")
+        tail = 0.5 * (1.0 - CONFIDENCE)
+        low, high = np.quantile(drawn, (tail, 1.0 - tail))
+        return float(low), float(high)
 
 
 def holm(p: ArrayLike) -> Array:

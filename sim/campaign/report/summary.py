@@ -15,7 +15,8 @@ from qpsafe.sim.campaign.report.comparisons import REFERENCES, Comparison, Judge
 from qpsafe.sim.campaign.report.findings import findings
 from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
-from qpsafe.sim.campaign.report.statistics import CONFIDENCE, Share, share
+from qpsafe.sim.campaign.report.statistics import CONFIDENCE, LEAST, Share, share
+from qpsafe.sim.campaign.report.swaps import FEW
 from qpsafe.sim.campaign.runner import Results
 from qpsafe.sim.campaign.trials.rows import CLASSES, Columns, of_controller
 
@@ -26,9 +27,12 @@ METHODS = (
     "Shares of trials: exact two-sided limits at 95 % (Clopper and Pearson). For none of n trials the rule of three, "
     "below 3/n at 95 % (one-sided), and the exact limit 1 - 0.05^(1/n) are given.",
     "Figures and differences: percentile bootstrap of whole trials, the same resamples for all controllers, seed 0. "
-    "Quantiles are order statistics, without interpolation.",
+    f"Quantiles are order statistics, without interpolation. Fewer than {LEAST} trials have no limits.",
     "p-values of shares: McNemar's test, exact and two-sided. Of figures: the bootstrap's percentiles "
-    "inverted, two-sided, never below 2/(resamples + 1).",
+    "inverted, two-sided, never below 2/(resamples + 1), nor below 2^(1-k) of k trials that differ.",
+    f"p-values of quantiles of fewer than {FEW} trials, and of means that differ in fewer than {FEW}: how often a "
+    "difference at least as large comes out when the two values of each trial change places at random; exact for up to "
+    "13 trials.",
     "All comparisons of this report with the references are corrected together by Holm's step-down method.",
 )
 

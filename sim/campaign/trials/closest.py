@@ -71,7 +71,12 @@ def closest(station: Station, q: Array, tracks: PersonTracks, at_most: float = n
         q: Joint position at every tick (T, n) [rad].
         tracks: Everybody at the same ticks.
         at_most: Larger distances are told as +inf, unless all are larger [m].
+
+    Raises:
+        ValueError: Fewer ticks of people than of the robot: compiled code would read beyond them.
     """
+    if len(q) > len(tracks.ends):
+        raise ValueError(f"{len(q)} ticks of a robot, {len(tracks.ends)} of people")
     ticks, (world, robot) = len(q), (station.world, station.robot)
     found, which = np.full((ticks, 7), np.nan), np.empty((ticks, 2), dtype=np.int64)
     boards = tracks.boards

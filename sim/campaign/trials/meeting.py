@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from qpsafe.sim.campaign.digests import State, state_of
 from qpsafe.sim.campaign.people import EncounterModel
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.campaign.trials.station import Station, station
@@ -55,7 +56,7 @@ def meeting(plan: Plan, what: int | Case) -> Meeting:
         plan: The campaign.
         what: Number of a trial from 0, whose motion is the plan's, in turn; or a case.
     """
-    model = _model(plan.people)
+    model = _model(plan.people, state_of(plan.people))
     if isinstance(what, int | np.integer):
         trial = int(what)
         seed, motion = plan.seed_of(trial), plan.motions[trial % len(plan.motions)]
@@ -69,5 +70,6 @@ def meeting(plan: Plan, what: int | Case) -> Meeting:
 
 
 @cache
-def _model(people: str | None) -> EncounterModel:
+def _model(people: str | None, state: State) -> EncounterModel:
+    """Read once for each state of its files."""
     return EncounterModel.load(people)

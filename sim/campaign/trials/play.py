@@ -40,13 +40,14 @@ _forward, _read_spots = linked(forward), linked(read_spots, *spot_rays.USES)
 
 def packed(station: Station, entry: Opponent) -> Packed | None:
     """The blocks of a controller for a station, made once a process; None where a part of it cannot be compiled."""
-    if entry.name not in station.packed:
+    name = f"{entry.name} {entry.edition}".rstrip()
+    if name not in station.packed:
         made, found = entry.make(station), None
         if isinstance(made, SafetyController):
             with suppress(Refused):
                 found = pack(made)
-        station.packed[entry.name] = found
-    return station.packed[entry.name]
+        station.packed[name] = found
+    return station.packed[name]
 
 
 def play(station: Station, entry: Opponent, senses: Senses, ticks: int, lag: float = 0.0) -> Recording | None:

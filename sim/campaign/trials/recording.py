@@ -86,8 +86,11 @@ def record(
         reference, number = tick.reference, STATUSES.index(tick.status)
         if not (np.isfinite(reference.q).all() and np.isfinite(reference.qd).all()):  # nothing moves on such a thing
             reference, number = JointReference(k, k * DT, q, np.zeros(n)), STATUSES.index(FAULT)
+        clock = float(tick.path_time)
+        if not np.isfinite(clock):  # nor does work go on: the path waits
+            clock, number = float(path_time[k - 1]) if k else 0.0, STATUSES.index(FAULT)
         run[0, k], run[1, k], run[2, k], run[3, k] = q, qd, reference.q, reference.qd
-        path_time[k], status[k] = tick.path_time, number
+        path_time[k], status[k] = clock, number
         phases.append(tick.phase)
         points.append(np.concatenate((tick.points, tick.near)) if len(tick.near) else tick.points)
         if observer is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -18,6 +19,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_quietly
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.sensing.skin.spots import SpotArray, load_spots
+from qpsafe.sim.campaign.digests import State, robot_state, state_of
 from qpsafe.sim.campaign.people.floor_plan import FloorPlan
 from qpsafe.sim.campaign.trials.servo import OMEGA, stopped, wire_speeds
 from qpsafe.sim.engine.distances import Distances
@@ -263,9 +265,8 @@ class Station:
             yield self.start, 0.5 / wire_speeds(robot, self.start, wild).max() * wild
 
 
-@cache
 def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", cell: str | None = None) -> Station:
-    """The station of a robot and a motion, built once a process.
+    """The station of a robot and a motion, built once a process for each state of their files.
 
     Args:
         robot: A bundled name or a path, as for `load_robot`.
@@ -277,8 +278,15 @@ def station(robot: str, motion: str, lag: float = 0.0, sensor: str = "ideal", ce
     Raises:
         ConfigurationError: The robot has no spots, or cannot do the motion.
     """
-    if motion not in MOTIONS and not Path(motion).is_file():
+    # os.path, unlike Path, says False of what cannot be a name
+    if motion not in MOTIONS and not os.path.isfile(motion):
         raise ConfigurationError("campaign", "motions", motion, f"one of {', '.join(MOTIONS)}, or a program's file")
+    state = robot_state(robot) + state_of(cell, None if motion in MOTIONS else motion)
+    return _station(robot, motion, lag, sensor, cell, state)
+
+
+@cache
+def _station(robot: str, motion: str, lag: float, sensor: str, cell: str | None, state: State) -> Station:
     found = Station(motion, load_quietly(robot), lag, sensor, cell)
     if found.robot.spots_path is None:
         raise ConfigurationError("campaign", "robot", robot, "a robot with distance sensors (spots.toml)")

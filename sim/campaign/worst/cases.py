@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.executors import answers, crew_at_work
-from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.plan import MOTIONS, Plan
 from qpsafe.sim.campaign.worst.search import Found, search_worst
 
 
@@ -131,6 +132,29 @@ def load_case(path: Path, number: int) -> Case:
     except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ConfigurationError(path, f"cases[{number}]", problem, "a case that a search has found") from None
+
+
+def check_case(where: str, plan: Plan, case: Encounter) -> None:
+    """Refuse a case that is none of a plan's: of other people, or of a motion that is not there.
+
+    Args:
+        where: The case, for errors.
+        plan: Among whose people it is to be played.
+        case: The case.
+
+    Raises:
+        ConfigurationError: Names what is wrong in it.
+    """
+    wanted = len(_continuous(plan))
+    if len(case.u) != wanted:
+        raise ConfigurationError(
+            where, "u", f"{len(case.u)} numbers", f"{wanted} numbers from 0 to 1, for these people"
+        )
+    for k, value in enumerate(case.u):
+        if not 0.0 <= value <= 1.0:
+            raise ConfigurationError(where, f"u[{k}]", value, "a number from 0 to 1")
+    if case.motion not in MOTIONS and not os.path.isfile(case.motion):
+        raise ConfigurationError(where, "motion", case.motion, f"{', '.join(MOTIONS)}, or a program's file")
 
 
 def _play(case: CaseFunction, plan: Plan, controller: str, piece: tuple[int, Encounter]) -> tuple[int, dict[str, Any]]:

@@ -8,6 +8,7 @@ one farthest from singular poses and limits with which `qpsafe check` finds noth
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
@@ -29,9 +30,7 @@ from qpsafe.tasks.reach import UnreachableError, joints_for
 from qpsafe.tasks.rotation import euler_zyx, exp3
 
 if TYPE_CHECKING:
-    from qpsafe.check.check import PathCheck
     from qpsafe.robot.robot import Robot
-    from qpsafe.tasks.program import Program
 
 Array = NDArray[np.float64]
 
@@ -71,14 +70,32 @@ class Work(NamedTuple):
         )
 
 
-@lru_cache(maxsize=8)
+class _Found(NamedTuple):
+    """What was found for a robot.
+
+    Attributes:
+        work: With all its sensors; None where there is none.
+        in_the_way: Sensors that are all that is wrong with another layout; none if there is no such layout.
+        refused: Why there is no work.
+    """
+
+    work: Work | None
+    in_the_way: frozenset[str] = frozenset()
+    refused: ConfigurationError | None = None
+
+
 def work_for(robot: Robot) -> Work:
     """The cell and the program that suit a robot.
 
     Raises:
         ConfigurationError: None was found; says what is wrong with the best.
     """
-    return _work(robot, sensors=True)
+    found = _searched(robot)
+    if found.work is None:
+        assert found.refused is not None
+        why = found.refused
+        raise ConfigurationError(why.where, why.key, why.value, why.expected)
+    return found.work
 
 
 def in_the_way(robot: Robot) -> frozenset[str]:
@@ -90,24 +107,42 @@ def in_the_way(robot: Robot) -> frozenset[str]:
     Returns:
         None of them where there is work with all, or where they are not what is wrong.
     """
-    try:
-        work_for(robot)
-    except ConfigurationError:
-        try:
-            work = _work(robot, sensors=False)
-        except ConfigurationError:
-            return frozenset()
-        found = _checked(robot, work.cell, parse_program(work.program, "the work chosen", robot), True)
-        return frozenset(seen.spot for seen in found.sightings or ())
-    return frozenset()
+    found = _searched(robot)
+    return frozenset() if found.work is not None else found.in_the_way
 
 
-def _work(robot: Robot, sensors: bool) -> Work:
+@lru_cache(maxsize=8)
+def _searched(robot: Robot) -> _Found:
+    """Look for work, once: every layout is checked with the sensors, whether it is theirs or not what is wrong."""
+    usual = Work(Cell(), PROGRAM.read_text(encoding="utf-8"), HANDS - TABLE_TOP, robot.name)
     if robot.name == ROBOT:
-        return Work(Cell(), PROGRAM.read_text(encoding="utf-8"), HANDS - TABLE_TOP, robot.name)
-    arm, usual = Arm.of(robot), PROGRAM.read_text(encoding="utf-8")
-    if not _wrong(robot, Cell(), usual, sensors):
-        return Work(Cell(), usual, HANDS - TABLE_TOP, robot.name)
+        return _Found(usual)
+    named, wrong = frozenset[str](), "no hole of the support and the box were both in reach, tool down"
+    try:
+        for work in _layouts(robot, usual):
+            trouble, seen = _wrong(robot, work)
+            if not trouble:
+                return _Found(work)
+            named = named or seen
+            wrong = wrong if work is usual else trouble
+    except ConfigurationError as refused:  # it is found out once
+        return _Found(None, named, refused)
+    expected = f"one that reaches support and box of some layout, tool down, or people and a --program for it ({wrong})"
+    return _Found(None, named, ConfigurationError("the third experiment", "robot", robot.name, expected))
+
+
+def _layouts(robot: Robot, usual: Work) -> Iterator[Work]:
+    """What may suit a robot: the bundled cell, then others, the best first.
+
+    Args:
+        robot: The robot.
+        usual: The bundled work.
+
+    Raises:
+        ConfigurationError: No layout can suit its tool.
+    """
+    yield usual
+    arm = Arm.of(robot)
     axis = tool_axis(robot, arm.tool)
     _check_tip(robot, arm.tool, axis)
     down = turned_to(axis, np.array([0.0, 0.0, -1.0]))
@@ -123,14 +158,8 @@ def _work(robot: Robot, sensors: bool) -> Work:
             if worth > 0.0:
                 found.append((worth, cell, turn))
     found.sort(key=lambda item: -item[0])
-    wrong = "no hole of the support and the box were both in reach, tool down"
     for (_, cell, turn), rates in product(found[:TRIED], RATES):
-        text = _program(arm.tool, cell, turn, rates)
-        wrong = _wrong(robot, cell, text, sensors)
-        if not wrong:
-            return Work(cell, text, HANDS - cell.top, robot.name)
-    expected = f"one that reaches support and box of some layout, tool down, or people and a --program for it ({wrong})"
-    raise ConfigurationError("the third experiment", "robot", robot.name, expected)
+        yield Work(cell, _program(arm.tool, cell, turn, rates), HANDS - cell.top, robot.name)
 
 
 def _check_tip(robot: Robot, tool: str, axis: Array) -> None:
@@ -152,19 +181,16 @@ def _check_tip(robot: Robot, tool: str, axis: Array) -> None:
         raise ConfigurationError("the third experiment", "robot", found, expected)
 
 
-def _wrong(robot: Robot, cell: Cell, text: str, sensors: bool) -> str:
-    """What is wrong with a program in a cell, in words; nothing if it can be run."""
+def _wrong(robot: Robot, work: Work) -> tuple[str, frozenset[str]]:
+    """What is wrong with work, in words, nothing if it can be done; and the sensors, if nothing but these is wrong."""
     try:
-        program = parse_program(text, f"the work chosen for {robot.name}", robot)
+        program = parse_program(work.program, f"the work chosen for {robot.name}", robot)
     except ProgramError as problem:
-        return problem.expected
-    return "; ".join(troubles(_checked(robot, cell, program, sensors)))
-
-
-def _checked(robot: Robot, cell: Cell, program: Program, sensors: bool) -> PathCheck:
-    """A program in a cell, with the robot's sensors or without."""
-    scene = build_scene(robot, pedestal=HANDS - cell.top, people=(), furnish=cell.furnish)
-    return check_path(robot, program, known=known_obstacles(scene), sensors=sensors)
+        return problem.expected, frozenset()
+    scene = build_scene(robot, pedestal=HANDS - work.cell.top, people=(), furnish=work.cell.furnish)
+    check = check_path(robot, program, known=known_obstacles(scene))
+    seen = () if troubles(check._replace(sightings=None)) else check.sightings or ()
+    return "; ".join(troubles(check)), frozenset(sighting.spot for sighting in seen)
 
 
 def _cell(scale: float, top: float) -> Cell:

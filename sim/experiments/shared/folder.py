@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import tomllib
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, find_robot
+from qpsafe.sim.experiments.shared.by_hand import marked, write_whole
 from qpsafe.text.json_text import json_text
 from qpsafe.text.lines import toml_lines
 
@@ -31,7 +33,7 @@ def copied_folder(robot: Robot, folder: Path, spots: str | None = None) -> Path:
     Args:
         robot: Loaded from a folder.
         folder: The copy's; files there that it writes, and all of sensors, are replaced.
-        spots: Text of a file of distance sensors for a robot that has none.
+        spots: Text of a file of distance sensors for a robot that has none; `robot.toml` is marked then, see `by_hand`.
 
     Returns:
         The folder.
@@ -62,12 +64,10 @@ def copied_folder(robot: Robot, folder: Path, spots: str | None = None) -> Path:
     kept = {name: path.read_bytes() for name, path in sensors.items()}
     if spots is not None:
         kept["spots.toml"] = spots.encode()
-    _clear(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    kept["robot.toml"] = changed.encode() if spots is None else marked(changed).encode()
     for name, content in kept.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    (folder / "robot.toml").write_text(changed, encoding="utf-8")
+        write_whole(folder / name, content)
+    _clear(folder, kept)
     return folder
 
 
@@ -87,10 +87,16 @@ def check_place(robot: Robot, folder: Path) -> None:
         raise ConfigurationError("a robot's copy", "folder", str(folder), expected)
 
 
-def _clear(folder: Path) -> None:
-    """Take away files of an earlier robot that would be taken for this one's."""
+def _clear(folder: Path, kept: Collection[str] = ()) -> None:
+    """Take away files of an earlier robot that would be taken for this one's.
+
+    Args:
+        folder: The copy's.
+        kept: Names of those that are this one's.
+    """
     for path in (*folder.glob(SENSORS), folder / "robot.toml"):
-        path.unlink(missing_ok=True)
+        if path.name not in kept:
+            path.unlink(missing_ok=True)
 
 
 def with_keys(text: str, stated: dict[str, str]) -> str | None:

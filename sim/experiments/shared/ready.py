@@ -18,16 +18,16 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
 from qpsafe.robot.robot_file.defaults import HOMELESS
 from qpsafe.robot.robot_file.starting_file import starting_robot_toml
+from qpsafe.sim.experiments.shared.by_hand import by_hand, write_marked
 from qpsafe.sim.experiments.shared.folder import copied_folder
 from qpsafe.sim.experiments.shared.home import Arm, chosen_home
 from qpsafe.sim.experiments.shared.skin import skin_toml
-from qpsafe.sim.world.robot_spec import UNSTATED, torques
+from qpsafe.sim.experiments.shared.strength import bearable
 from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
-STRONG = 0.9  # share of a motor's torque that motion may take
 MOST = 3.0  # longest arm that the experiments' people can walk around [m]
 
 
@@ -61,33 +61,61 @@ def made_ready(
     """
     robot, folder = load_quietly(name), out / "robot"
     check_arm(where, robot, joints)
+    bare = find_robot(name).suffix != ".toml"
     if name in bundled_robots():
         return Ready(robot)
-    said, bare = list(robot.notes), find_robot(name).suffix != ".toml"
+    if not bare and robot.spots_path is not None:
+        return Ready(robot, robot.notes)
+    if by_hand(folder / "robot.toml"):
+        return _corrected(where, robot, folder)
+    file, said = folder / "spots.toml", list(robot.notes)
+    theirs = file.read_text(encoding="utf-8") if by_hand(file) else None
     if bare:
         found = choices(robot)
-        if not found.sensors:
-            raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "robot.toml").write_text(found.robot_toml(folder), encoding="utf-8")
-        (folder / "spots.toml").write_text(found.spots_toml, encoding="utf-8")
-        said = found.said
-    elif robot.spots_path is None:
-        text, count = skin_toml(robot)
-        if not count:
-            raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
-        copied_folder(robot, folder, text)
-        said.append(f"{count} distance sensors put on its links")
+        text, count, said = found.spots_toml, found.sensors, found.said
     else:
-        return Ready(robot, tuple(said))
-    off = () if in_the_way is None else in_the_way(load_quietly(folder))
-    file = folder / "spots.toml"
-    text = without(file.read_text(encoding="utf-8"), off)
+        text, count = skin_toml(robot)
+        said.append(f"{count} distance sensors put on its links")
+    if not count:
+        raise ConfigurationError(where, "--robot", robot.name, "links long enough to carry a distance sensor")
+    if bare:
+        write_marked(folder / "robot.toml", found.robot_toml(folder))
+    else:
+        copied_folder(robot, folder, text if theirs is None else theirs)
+    if theirs is not None:
+        made, off = load_quietly(folder), frozenset[str]()
+        said.append(f"{file} was changed by hand and is kept: its sensors are taken")
+    else:
+        write_marked(file, text)
+        made = load_quietly(folder)
+        off = frozenset() if in_the_way is None else frozenset(in_the_way(made))
+    text = without(text, off)
     if off and "[[spot]]" in text:
-        file.write_text(text, encoding="utf-8")
+        write_marked(file, text)
+        made = load_quietly(folder)
         said.append(f"{counted(len(off), 'sensor')} taken off again: what stands in its cell would count as danger")
     said.append(f"written to {folder}: correct it, and give it as --robot")
-    return Ready(load_quietly(folder), tuple(said))
+    return Ready(made, tuple(said))  # the robot that was looked at, so that nothing is looked for twice
+
+
+def _corrected(where: str, robot: Robot, folder: Path) -> Ready:
+    """The robot of a folder that was written here and then corrected: nothing there is written over.
+
+    Args:
+        where: The command, for errors.
+        robot: Whose model it should be.
+        folder: Of the corrected files.
+
+    Raises:
+        ConfigurationError: It is of another model.
+        RobotFileError: What is there is wrong.
+    """
+    kept = load_quietly(folder)
+    if kept.model_path.resolve() != robot.model_path.resolve():
+        expected = f"another folder, or that one taken away: its robot.toml, of {kept.name}, was changed by hand"
+        raise ConfigurationError(where, "--out", str(folder), expected)
+    said = f"{folder / 'robot.toml'} was changed by hand: that folder is taken as it is; without it all is chosen anew"
+    return Ready(kept, (*kept.notes, said))
 
 
 def without(spots_toml: str, names: Collection[str]) -> str:
@@ -136,9 +164,10 @@ def choices(robot: Robot, sensors: bool = True) -> Choices:
     """
     said, home = list(robot.notes), robot.home
     if any(note.startswith(HOMELESS) for note in said):  # an MJCF may have a keyframe
-        home = chosen_home(robot)
+        home, missed = chosen_home(robot)
         said = [note for note in said if not note.startswith(HOMELESS)]
         said.append(f"home posture chosen: {', '.join(f'{q:.2f}' for q in home)} rad")
+        said += [f"of the home posture, not as it should be: {item}" for item in missed]
     share, words = bearable(robot)
     made = load_quietly(robot.model_path, home=home, max_acceleration=share * robot.max_acceleration)
     text, count = "", 0
@@ -148,20 +177,6 @@ def choices(robot: Robot, sensors: bool = True) -> Choices:
             text, count = skin_toml(load_quietly(place))
     said += [*words, *([f"{count} distance sensors put on its links"] if sensors else [])]
     return Choices(made, text, count, said)
-
-
-def bearable(robot: Robot) -> tuple[float, list[str]]:
-    """How much of assumed accelerations the stated torques can bear, and what is to be said of it."""
-    stated = np.ravel(robot.model.effortLimit)
-    known = (stated > 0.0) & (stated < UNSTATED)
-    if not known.any():
-        return 1.0, []
-    moving, holding = torques(robot)
-    room = (STRONG * stated - holding)[:, known] / np.maximum(moving[:, known], 1e-9)
-    share = float(np.clip(room.min(), 0.1, 1.0))
-    if share == 1.0:
-        return 1.0, []
-    return share, [f"accelerations reduced to {100 * share:.0f} %: more the stated torques cannot bear everywhere"]
 
 
 def check_arm(where: str, robot: Robot, joints: int) -> None:

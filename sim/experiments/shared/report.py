@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from qpsafe.sim.experiments.shared.following import LATE, OFF, farthest_off
 from qpsafe.sim.recording.log import RunLog
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ def summarise(
     shown: list[Check | str] = [*_order(log, windows), *_released(log, windows)]
     if not tuned:
         shown = [c if isinstance(c, str) else c._replace(counts=False, name=f"{c.name} (no promise)") for c in shown]
-    found = [*shown, *_errors(log, windows), *_limits(log, robot)]
+    found = [*shown, *_errors(log, windows), *_limits(log, robot), _followed(log, robot)]
     approaches = []
     for start, end in windows:
         if not _complete(log, end):
@@ -202,8 +203,8 @@ def _order(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
 
 def _errors(log: RunLog, windows: tuple[Window, ...]) -> list[Check | str]:
     position, orientation = _norm(log.position_error), _norm(log.orientation_error)
-    seen = np.flatnonzero(np.isfinite(log.distances).any(axis=1))
-    quiet = slice(0, seen[0] if len(seen) else len(log.time))
+    danger = np.flatnonzero(log.cdf_n > 0.0)  # of what stands by itself, a sensor's reading is none
+    quiet = slice(0, danger[0] if len(danger) else len(log.time))
     checks = _pair("before anything is detected", position[quiet], orientation[quiet], (0.1, 0.001))
     for start, end in windows:
         medium = _before_high(log, start, end)
@@ -267,6 +268,15 @@ def _limits(log: RunLog, robot: Robot) -> list[Check | str]:
         measured = f"passed by {most:.1e} {unit}" if most > 0.0 else f"{abs(most):.3g} {unit} to spare"
         checks.append(Check(name, measured, f"passed by at most {LIMIT_TOLERANCE:g}", bool(most <= LIMIT_TOLERANCE)))
     return checks
+
+
+def _followed(log: RunLog, robot: Robot) -> Check:
+    """The measured robot is where it was commanded to be."""
+    off, joint = farthest_off(log)
+    unit = "m" if robot.sliding[joint] else "rad"
+    measured = f"{robot.joint_names[joint]} up to {off:.2g} {unit} off"
+    promised = f"< {OFF:g} {unit} off all commands of the last {LATE:g} s"
+    return Check("measured joints follow the commanded ones", measured, promised, bool(off < OFF))
 
 
 def _bound(name: str, value: float, bound: float, unit: str) -> Check:

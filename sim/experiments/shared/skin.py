@@ -22,6 +22,8 @@ from qpsafe.sensing.skin.spot import Spot
 from qpsafe.sensing.skin.spots import SpotArray
 from qpsafe.sim.experiments.shared.home import Arm
 from qpsafe.sim.placement.run import MonteCarlo
+from qpsafe.sim.world.rays import SpotRays
+from qpsafe.sim.world.scene import build_scene
 from qpsafe.text.json_text import json_text
 
 if TYPE_CHECKING:
@@ -49,6 +51,7 @@ def skin_toml(robot: Robot) -> tuple[str, int]:
         robot: Loaded from a folder: what is simulated reads its file.
     """
     places = [spot for link in range(len(robot.wire_frames)) for spot in _places(robot, link)]
+    places = _unobstructed(robot, places) if places else places
     if not places:
         return "", 0
     nodes = SpotArray.of(places)
@@ -61,6 +64,13 @@ def skin_toml(robot: Robot) -> tuple[str, int]:
         "first guess, to be replaced by what `qpsafe place` chooses, or by where yours are."
     )
     return spots_toml(candidates, chosen, remark), len(chosen)
+
+
+def _unobstructed(robot: Robot, places: list[Spot]) -> list[Spot]:
+    """Those that see nothing at home where nobody is there: neither pedestal nor floor."""
+    spots, scene = SpotArray.of(places), build_scene(robot, people=())
+    seen = SpotRays(scene, spots).distances(scene.make_data(), robot.at(robot.home))
+    return [spot for spot, distance in zip(places, seen, strict=True) if not distance <= SENSOR.range_max]
 
 
 def _best(robot: Robot, candidates: Candidates) -> tuple[list[int], str]:

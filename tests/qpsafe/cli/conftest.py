@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import made_up_trials
 import pytest
+import typer
 from rich.cells import cell_len
 from rich.console import Console
 from typer.testing import CliRunner
@@ -61,6 +62,22 @@ def without_display(
     gl_available.cache_clear()
     for number, handler in handlers.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(scope="session")
+def parsed() -> Callable[[str, list[str]], Any]:
+    """The context of a command with words, behind one for each argument that it must have; nothing is run."""
+    group: Any = typer.main.get_command(app)
+
+    def parse(path: str, words: list[str]) -> Any:
+        command, context, name = group, None, "qpsafe"
+        for inner in path.split():
+            context = typer.Context(command, info_name=name, parent=context)
+            command, name = command.commands[inner], inner
+        needed = ["x" for part in command.params if part.param_type_name == "argument" and part.required]
+        return command.make_context(name, [*needed, *words], parent=context)
+
+    return parse
 
 
 @pytest.fixture

@@ -15,10 +15,15 @@ from amounts import crossed
 from made_up_trials import FEW, without_times
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
+from qpsafe.sim.campaign.people import EncounterModel
 from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
 from qpsafe.sim.campaign.runner import stored_results
+from qpsafe.sim.campaign.speed import Speed
 
 Campaign = Callable[..., Any]
+
+#: No number of a trial, nor a case.
+WORDS = ("#0", "#", "", "x#y", "+1", "1.5", "9" * 5000, "10000000", str(2**53), "worst.json#" + "9" * 5000)
 
 
 def test_a_campaign_is_kept_reported_and_printed(campaign: Campaign, tmp_path: Path) -> None:
@@ -119,11 +124,18 @@ def test_a_folder_is_reported_again(campaign: Campaign, tmp_path: Path) -> None:
         (["report", "nowhere"], "manifest.json"),
         (["show", "first"], "TRIAL = 'first'"),
         (["show", "worst.json#0"], "worst.json: cases[0]"),
-        (["show", "3", "--controller", "brave"], "--controllers = 'brave'"),
-        (["worst", "brave"], "--controllers = 'brave'"),
+        (["show", "3", "--controller", "brave"], "show: controller = 'brave'"),
+        (["show", "3", "--controller", ""], "show: controller = ''"),
+        (["show", "3", "--controller", "none,stop"], "controller = 'none,stop'"),
+        (["worst", "brave"], "worst: controller = 'brave'"),
+        (["worst", ""], "worst: controller = ''"),
+        *((["show", word], f"TRIAL = {word[:40]!r}") for word in WORDS),
+        *((["limit", word], f"TRIAL = {word[:40]!r}") for word in WORDS),
+        (["reprot", "c1"], "COMMAND = 'reprot': expected a plan's TOML file that is there, or a command: run, show"),
         (["limit", "first"], "TRIAL = 'first': expected the number of a trial, or FILE.json#K with"),
         (["limit", "worst.json#0"], "worst.json: cases[0]"),
-        (["limit", ".", "--seed", "3"], "--seed = '.'"),
+        (["limit", ".", "--seed", "3"], "--seed = 3: expected nothing"),
+        (["limit", ".", "--controller", ""], "manifest.json"),
         (["limit", "."], "manifest.json"),
     ],
 )
@@ -196,3 +208,31 @@ def test_the_command_that_is_told_can_be_typed_whatever_the_folder_is_called(
     monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: failing)
     line = next(line for line in campaign(*FEW, "--out", folder).output.splitlines() if line.startswith("to judge"))
     assert shlex.split(line)[-4:] == ["qpsafe", "campaign", "report", folder]
+
+
+@pytest.mark.usefixtures("plain_page")
+def test_a_report_needs_none_of_the_plans_files_any_more(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From another directory, and after people's file has gone: then alone the engine is not timed."""
+    text = '[[person]]\nname = "A"\nstart = [1.3, 0.1]\n[[person.step]]\ndo = "walk"\nto = [0.5, 0.0]\nspeed = 1.0\n'
+    (tmp_path / "ada.toml").write_text(text)
+    asked: list[Plan] = []
+
+    def timed(plan: Plan, trials: int) -> Speed:
+        asked.append(plan)
+        EncounterModel.load(plan.people)
+        return Speed(100.0, 90.0, float("nan"))
+
+    monkeypatch.setattr("qpsafe.sim.campaign.speed.engine_speed", timed)
+    told = json.loads(campaign(*FEW, "--people", "ada.toml", "--out", "kept", "--json").stdout)
+    (tmp_path / "else").mkdir()
+    monkeypatch.chdir(tmp_path / "else")
+    there = json.loads(campaign("report", "../kept", "--json").stdout)
+    (tmp_path / "ada.toml").unlink()
+    gone = json.loads(campaign("report", "../kept", "--json").stdout)
+    assert [found["engine"].pop("simulated_s_per_wall_s") for found in (told, there, gone)] == [100.0, 100.0, None]
+    for found in (told, there, gone):
+        found.pop("engine")
+    assert told == there == gone
+    assert {plan.people for plan in asked} == {str(tmp_path / "ada.toml")}

@@ -47,7 +47,7 @@ def test_the_limit_of_a_trial_or_a_case(campaign: Campaign, monkeypatch: pytest.
     table = {
         "plan": Plan(seed=3, lag=0.02).to_dict(),
         "controller": "strict",
-        "cases": [{"motion": "hold", "u": [0.5]}],
+        "cases": [{"motion": "hold", "u": [0.5] * 42}],
     }
     (tmp_path / "worst.json").write_text(json.dumps(table))
     told = json.loads(campaign("limit", "worst.json#0", "--evaluations", "300", "--json").stdout)
@@ -55,7 +55,7 @@ def test_the_limit_of_a_trial_or_a_case(campaign: Campaign, monkeypatch: pytest.
     assert "no proof" in told["sentence"]
     (plan, trial, controller, tries), (other, said, name, few) = asked
     assert (plan.seed, plan.motions, trial, controller, tries) == (9, ("hold",), 0, "stop", EVALUATIONS)
-    assert (other.lag, said, name, few) == (0.02, Encounter("hold", (0.5,)), "strict", 300)
+    assert (other.lag, said, name, few) == (0.02, Encounter("hold", (0.5,) * 42), "strict", 300)
 
 
 @pytest.mark.usefixtures("plain_page")

@@ -13,6 +13,7 @@ import made_up_trials
 import numpy as np
 import pytest
 
+from qpsafe.errors import ConfigurationError
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.report.page import show_command
 from qpsafe.sim.campaign.worst.cases import Encounter, cases_to_dict, encounter_of, find_worst, load_case
@@ -44,13 +45,13 @@ def test_show_plays_the_trial_or_the_case_that_is_named(
         assert word in result.output
     assert "nan" not in result.output
     table = {"plan": Plan(seed=3, lag=0.02).to_dict(), "controller": "strict"}
-    table["cases"] = [{}, {"motion": "hold", "u": [0.25, 1]}]
+    table["cases"] = [{}, {"motion": "hold", "u": [0.25] * 41 + [1]}]
     (tmp_path / "worst.json").write_text(json.dumps(table))
     told = campaign("show", "worst.json#1", "--out", "there", "--seed", "5", "--json")
     assert json.loads(told.stdout)["contact"] is True
     (plan, trial, controller, out, _), (other, case, name, there, label) = played
     assert (plan.seed, plan.sensor, trial, controller, out) == (9, "sharp", 7, "stop", Path("out/campaign-show"))
-    assert (other.seed, other.lag, case) == (5, 0.02, Encounter("hold", (0.25, 1.0)))
+    assert (other.seed, other.lag, case) == (5, 0.02, Encounter("hold", (0.25,) * 41 + (1.0,)))
     assert (name, there, label) == ("strict", Path("there"), "worst-1")
     (tmp_path / "plan.toml").write_text("trials = 3")
     twice = campaign("show", "worst.json#1", "--file", "plan.toml")
@@ -109,3 +110,27 @@ def test_the_first_coordinate_chooses_the_motion_and_threads_change_nothing() ->
             cases_to_dict(plan, "stop", found) for found in (alone, find_worst(plan, "stop", 80, executor, **options))
         ]
     assert json_text(both[0]) == json_text(both[1])
+
+
+@pytest.mark.parametrize("command", ["show", "limit"])
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        ({}, ["--motions", "line"], "--motions = 'line': expected none"),
+        ({}, ["--controller", ""], "controller = ''"),
+        ({"u": [0.5] * 41}, [], "worst.json#0: u = '41 numbers': expected 42"),
+        ({"u": [0.5] * 41 + [1.5]}, [], "worst.json#0: u[41] = 1.5"),
+        ({"u": [float("nan")] * 42}, [], "worst.json#0: u[0] = nan"),
+        ({"motion": "dance"}, [], "worst.json#0: motion = 'dance'"),
+        ({"u": 3}, [], "worst.json: cases[0]"),
+    ],
+)
+def test_a_case_that_is_none_is_named_with_its_file(
+    campaign: Campaign, command: str, change: dict[str, Any], options: list[str], said: str, tmp_path: Path
+) -> None:
+    table = {"plan": Plan().to_dict(), "controller": "stop", "cases": [{"motion": "hold", "u": [0.5] * 42} | change]}
+    (tmp_path / "worst.json").write_text(json.dumps(table))
+    refused = campaign(command, "worst.json#0", *options)
+    assert isinstance(refused.exception, ConfigurationError)
+    assert said in str(refused.exception)
+    assert len(str(refused.exception)) < 300

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import shlex
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import qpsafe
 from qpsafe.cli.main import app
+from qpsafe.cli.sensors.place import _command, with_words
 from qpsafe.errors import ConfigurationError
 from qpsafe.placement import candidates
 from qpsafe.placement.sensors import Sensor
@@ -84,7 +90,7 @@ def test_arrays_are_placed_and_load(tmp_path: Path) -> None:
 def test_the_bundled_spots_are_what_the_command_at_their_head_makes(file: str, tmp_path: Path) -> None:
     bundled = (qpsafe.load_robot("irb140").folder / file).read_text(encoding="utf-8")
     command = bundled.replace("\n# ", " ").partition("`")[2].partition("`")[0]
-    name, *arguments = command.split()
+    name, *arguments = shlex.split(command)
     assert name == "qpsafe"
     result = CliRunner().invoke(app, [*arguments, "--no-pictures", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
@@ -129,3 +135,25 @@ def test_a_length_out_of_range_is_refused_before_any_node_is_looked_for(option: 
     assert result.exit_code == 2
     assert option in result.output
     assert "node" not in result.output
+
+
+@given(
+    name=st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z"), include_characters=" -"), min_size=1),
+    spots=st.integers(1, 99),
+    before=st.integers(0, 118),
+    options=st.lists(st.sampled_from(["--no-caps", "--no-exact", "--radius 1.5", "--objective nearest"]), unique=True),
+)
+@example(name="ärm 1", spots=10, before=0, options=[])
+@example(name="it's " * 40, spots=10, before=7, options=["--no-exact"])
+@example(name="a-long-name-" * 12, spots=10, before=50, options=["--no-exact"])
+def test_the_command_at_the_head_can_be_typed_as_it_stands(
+    name: str, spots: int, before: int, options: list[str], parsed: Callable[[str, list[str]], Any]
+) -> None:
+    """Lines are broken between its words alone: what stands there is the command again, behind a # on each line."""
+    typed = ["--spots", str(spots), *(word for option in options for word in option.split()), "--", name]
+    words = _command(parsed("place", ["--json", *typed]))
+    text = with_words(words, lambda command: "\n".join(wrap("x" * before + f" made by <<{command}>>: of many", 118)))
+    there = shlex.split(text.partition("<<")[2].rpartition(">>")[0])
+    assert there == words
+    again = parsed("place", there[2:]).params
+    assert again == parsed("place", typed).params

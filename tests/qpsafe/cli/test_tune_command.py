@@ -122,6 +122,24 @@ def test_what_is_not_better_is_not_written(tmp_path: Path, monkeypatch: pytest.M
     assert "already as good" in result.output
     assert "stays as it is" in result.output
     assert (tmp_path / "own" / "robot.toml").read_text(encoding="utf-8") == text
+    assert "with the present values, since nothing speaks for others" in " ".join(result.output.split())
+    kept = qpsafe.load_robot(tmp_path / "x" / "robot")
+    assert farthest(present(kept), present(qpsafe.load_robot("irb140"))) < 1e-12
+
+
+def test_a_robot_whose_file_cannot_be_written_is_refused_before_the_search(tmp_path: Path) -> None:
+    shutil.copytree(qpsafe.load_robot("irb140").folder, tmp_path / "own")
+    file = tmp_path / "own" / "robot.toml"
+    text = file.read_text(encoding="utf-8")
+    start, end = text.index("[danger]"), text.index("# Where distance sensors")
+    text = "danger = { delta = 11.5, epsilon = 0.15, delta_f = 7.5, epsilon_f = 0.25 }\n" + text[:start] + text[end:]
+    file.write_text(text, encoding="utf-8")
+    result = tune(*FEW, "--robot", "own", "--out", "x")
+    assert isinstance(result.exception, ConfigurationError)
+    assert "a line of its own" in str(result.exception)
+    assert str(file) in str(result.exception)
+    assert not (tmp_path / "x").exists()
+    assert file.read_text(encoding="utf-8") == text
 
 
 @pytest.mark.slow

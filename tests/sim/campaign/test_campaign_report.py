@@ -187,7 +187,21 @@ def test_limits_that_are_passed_and_bad_commands_are_found_and_nothing_else_is()
     assert faults(lambda row: row.update(bad_ticks=int(row["trial"] < 2 and row["controller"] == "none"))) == [
         "none gives a bad command in 2 trials"
     ]
-    assert "passes a joint limit" in faults(lambda row: row.update(limit_excess=float("nan")))[0]
+    for wild in (float("nan"), float("inf")):
+        said = faults(lambda row, wild=wild: row.update(limit_excess=wild if row["trial"] < 2 else 0.02))  # type: ignore[misc]
+        whole = "passes a joint limit in 20 trials, by 2 %, in 2 trials by a command that is no number"
+        assert said == [f"{name} {whole}" for name in ("none", "default")]
+        assert faults(lambda row, wild=wild: row.update(limit_excess=wild), 1) == [  # type: ignore[misc]
+            f"{name} passes a joint limit in 1 trial, in 1 trial by a command that is no number"
+            for name in ("none", "default")
+        ]
+
+
+@pytest.mark.parametrize("name", ["progress", "lost_time", "under_sp", "distance"])
+def test_a_figure_that_is_no_number_where_it_always_applies_is_named_and_not_taken_for_none(name: str) -> None:
+    made = played(Plan(trials=3, controllers=("none", "stop")), lambda row: row.update({name: float("nan")}))
+    with pytest.raises(ConfigurationError, match=rf"values\['none {name}"):
+        summary(made)
 
 
 # The page

@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from qpsafe.errors import ConfigurationError
+from qpsafe.sim.campaign.report.resamples import Ranks, unit_of
 from qpsafe.sim.campaign.report.statistics import (
     MEAN,
     MEDIAN,
     Bootstrap,
     Statistic,
-    _Ranks,
-    _unit,
     holm,
     mcnemar,
     share,
@@ -113,7 +112,7 @@ def test_quantiles_of_many_trials_are_found_in_a_window_of_ranks_and_outside(qua
     data = np.random.default_rng(1).gamma(2.0, size=5000).round(2)  # with ties
     drawn = np.random.default_rng(9).integers(5000, size=(40, 5000))
     expected = np.quantile(data[drawn], quantile, axis=1, method="inverted_cdf")
-    ranks = _Ranks(data, quantile)
+    ranks = Ranks(data, quantile)
     assert ranks.window.stop - ranks.window.start < 600
     weights = np.array([np.bincount(line, minlength=5000) for line in drawn], dtype=float).T
     np.testing.assert_array_equal(ranks.quantiles(weights, ranks.before @ weights), expected)
@@ -145,14 +144,14 @@ def test_means_do_not_depend_on_the_order_of_summation() -> None:
     for trials in (1, 2, 7, 1000, 30_000):
         for scale in (1e-12, 1.0, 3.7e5):
             x = scale * rng.gamma(0.3, size=trials)
-            whole = np.rint(x / _unit(x))
+            whole = np.rint(x / unit_of(x))
             weights = rng.multinomial(trials, np.full(trials, 1.0 / trials)).astype(float)
             sums = {float(weights[order] @ whole[order]) for order in (rng.permutation(trials) for _ in range(20))}
             assert len(sums) == 1
             assert max(sums) < 2.0**53
-            assert sums.pop() * _unit(x) == pytest.approx(weights @ x, rel=1e-9)
+            assert sums.pop() * unit_of(x) == pytest.approx(weights @ x, rel=1e-9)
     for same in (0.0, 1e-310, 0.3, -7.1):  # nothing to estimate: limits that hold the value
-        value, low, high, _ = Bootstrap({"x": np.full(5, same)}, {"x": (MEAN,)}, 9).estimate("x", MEAN)
+        value, low, high, _ = Bootstrap({"x": np.full(6, same)}, {"x": (MEAN,)}, 9).estimate("x", MEAN)
         assert low == value == high == pytest.approx(same, rel=1e-12)
 
 
@@ -167,7 +166,7 @@ def test_a_difference_changes_its_sign_with_the_pair(item: Statistic) -> None:
 
 
 def test_the_same_controller_does_not_differ_from_itself_and_a_shift_shifts() -> None:
-    x = np.random.default_rng(3).normal(size=40)
+    x = np.random.default_rng(3).normal(size=60)
     made = boot({"x": x, "same": x.copy(), "up": x + 2.0})
     for item in ALL:
         assert made.difference("x", "same", item) == (0.0, 0.0, 0.0, 1.0)
@@ -181,7 +180,7 @@ def test_the_same_controller_does_not_differ_from_itself_and_a_shift_shifts() ->
 def test_blocks_of_resamples_change_nothing_and_seeds_do(monkeypatch: pytest.MonkeyPatch) -> None:
     x = np.random.default_rng(4).normal(size=30)
     whole, done = boot({"x": x}, 100), []
-    monkeypatch.setattr("qpsafe.sim.campaign.report.statistics._BLOCK", 300)
+    monkeypatch.setattr("qpsafe.sim.campaign.report.resamples._BLOCK", 300)
     parts = Bootstrap({"x": x}, {"x": ALL}, 100, progress=done.append)
     assert done == list(range(10, 101, 10))
     for item in ALL:

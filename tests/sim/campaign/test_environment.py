@@ -133,6 +133,48 @@ def test_an_action_of_another_shape_is_refused(env: EncounterEnv) -> None:
         env.step(np.zeros(7))
 
 
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.zeros(6, dtype=complex), np.ma.masked_all(6), ["0"] * 6, "000000", np.zeros(6, bool),
+        [0.0, [1.0], 0.0, 0.0, 0.0, 0.0], None, object(), np.zeros(6, dtype=object), np.zeros((6, 1)), 0.0, {},
+    ],
+)  # fmt: skip
+def test_what_is_no_action_is_refused_and_changes_nothing(env: EncounterEnv, action: Any) -> None:
+    first, _ = env.reset(seed=1)
+    with pytest.raises(ConfigurationError, match="action"):
+        env.step(action)
+    once, *_ = env.step(np.zeros(6))
+    env.reset(seed=1)
+    for key, value in env.step([0] * 6)[0].items():
+        assert_array_equal(once[key], value)
+    assert first.keys() == once.keys()
+
+
+@pytest.mark.parametrize("stop", [True, False])
+def test_no_step_before_an_encounter_or_after_its_end(people: str, stop: bool, rng: np.random.Generator) -> None:
+    env = EncounterEnv(motion="line", people=people, stop_at_contact=stop)
+    with pytest.raises(ConfigurationError, match=r"reset\(\) first"):
+        env.step(np.zeros(6))
+    for seed in (3, int(rng.integers(100))):
+        env.reset(seed=seed)
+        over = False
+        while not over:
+            *_, terminated, truncated, info = env.step(np.zeros(6))
+            over = terminated or truncated
+        for _ in range(3):
+            with pytest.raises(ConfigurationError, match=r"reset\(\) first"):
+                env.step(np.zeros(6))
+        again = env.measures()
+        assert (again["contact"], again["distance"]) == (info["measures"]["contact"], info["measures"]["distance"])
+
+
+@pytest.mark.parametrize("stop", ["no", 0, None, np.bool_(False), "False"])
+def test_whether_contact_stops_it_is_true_or_false(stop: Any) -> None:
+    with pytest.raises(ConfigurationError, match="stop_at_contact"):
+        EncounterEnv(stop_at_contact=stop)
+
+
 def test_contact_ends_an_episode_with_its_row(env: EncounterEnv) -> None:
     wrapped = RecordEpisodeStatistics(env)
     _, info = wrapped.reset(seed=3)

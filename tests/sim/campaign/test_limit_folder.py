@@ -130,13 +130,14 @@ def test_limits_of_something_else_are_refused_by_name(
             stored_limits(folder, results)
 
 
-def test_a_controller_or_a_folder_that_is_not_there_is_named(folder: Path, tmp_path: Path) -> None:
+def test_a_controller_or_a_folder_that_is_not_there_is_named(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(ConfigurationError, match="controller = 'strict': expected one of stop, default"):
         limits_of(folder, "strict", limit=made_up)
     with pytest.raises(ConfigurationError, match=r"manifest\.json"):
         limits_of(tmp_path, "default", limit=made_up)
-    manifest = folder / "manifest.json"
-    manifest.write_text(manifest.read_text().replace('"code": "', '"code": "other'))
+    monkeypatch.setattr("qpsafe.sim.campaign.plan.code_digest", lambda: "other")
     with pytest.raises(ConfigurationError, match="code"):  # these trials would not be met again
         limits_of(folder, "default", limit=made_up)
 

@@ -1,5 +1,6 @@
 """Opponents keep what they promise: stops stand before they are touched, scaling nears nobody faster than v_max."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,15 @@ from qpsafe.sim.campaign.opponents import registry
 from qpsafe.sim.campaign.opponents.monitor import Monitor
 from qpsafe.sim.campaign.opponents.registry import names, opponent, register
 from qpsafe.sim.campaign.trials.closest import closest
-from qpsafe.sim.campaign.trials.recording import Recording, record
+from qpsafe.sim.campaign.trials.recording import STATUSES, Recording, record
 from qpsafe.sim.campaign.trials.senses import Senses
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.campaign.trials.station import station
+from qpsafe.sim.campaign.trials.work import work
 from qpsafe.sim.engine.bodies import Bodies
 from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.experiments.fast_person import at_speed
+from qpsafe.tick import FAULT
 
 TICKS = 1100  # somebody who walks at 1.6 m/s is there by then
 
@@ -159,3 +162,26 @@ def test_the_guide_says_what_every_controller_is() -> None:
     page = (Path(__file__).resolve().parents[3] / "docs" / "how-to" / "campaign.md").read_text(encoding="utf-8")
     for name in names():
         assert f"| `{name}` | {opponent(name).sentence} |" in page
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), -float("inf")])
+@pytest.mark.parametrize("when", [0, 3])
+def test_a_clock_that_is_no_number_is_a_fault_and_no_work(wrong: float, when: int) -> None:
+    """It was taken for no time lost."""
+    place, ticks = station("irb140", "line"), 6
+
+    class Wild:
+        def __init__(self) -> None:
+            self.own, self.count = place.controller(), 0
+
+        def step(self, q: Any, qd: Any, distances: Any = None, *, points: Any = None, **_: Any) -> Any:
+            tick = self.own.step(q, qd, points=np.empty((0, 3)))
+            self.count += 1
+            return replace(tick, path_time=wrong) if self.count == when + 1 else tick
+
+    entry = registry.Opponent("wild", "a clock that stops", lambda _: Wild())  # type: ignore[arg-type, return-value]
+    run = record(place, entry, Senses(place, PersonTracks.of((), [()] * ticks, DT), "ideal", 0), ticks)
+    assert run.path_time[when] == (run.path_time[when - 1] if when else 0.0)
+    assert np.flatnonzero(run.status == STATUSES.index(FAULT)).tolist() == [when]
+    assert np.isfinite(work(run, place)).all() or np.isnan(work(run, place).path_error)
+    assert work(run, place).bad_ticks == 1

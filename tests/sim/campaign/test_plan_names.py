@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -10,8 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError
-from qpsafe.sim.campaign.opponents.registry import opponent
+from qpsafe.sim.campaign.digests import file_name_of
+from qpsafe.sim.campaign.opponents.registry import names, opponent
 from qpsafe.sim.campaign.plan import Plan, load_plan
+from qpsafe.sim.campaign.trials.station import station
 
 LONG = ["ä" * 200, "a" * 200, "a/" * 100, "ä" * 190 + ".toml", "\\u0000", "a\\u0000.toml", "/dev/null/x", "." * 200]
 KEYS = ["robot", "people", "cell", "motions", "controllers"]
@@ -92,3 +95,23 @@ def test_a_controller_is_described_whatever_its_docstring_is(said: str, tmp_path
     (tmp_path / "mine.py").write_text(f"def make(station): ...\nmake.__doc__ = {said}\n")
     found = opponent(f"{tmp_path / 'mine.py'}:make")
     assert found.sentence == ("One." if "One" in said else "a controller of the user's")
+
+
+@given(st.lists(st.text(st.characters(codec="utf-8") | st.sampled_from("./-:_ "), min_size=1, max_size=8), unique=True))
+def test_two_controllers_have_two_files(names: list[str]) -> None:
+    """On disks that know capitals from small letters, or not."""
+    words = [file_name_of(name) for name in (*names, "a/b.py:f", "a-b.py:f", "x" * 300, "x" * 301)]
+    assert len(set(words)) == len(words)
+    assert all(re.fullmatch(r"[\w.][\w.-]{0,120}", word) and word.strip(".") for word in words)
+
+
+def test_bundled_controllers_have_the_files_that_they_had() -> None:
+    for name in names():
+        assert file_name_of(name) == name
+        assert file_name_of(f"{name}_perfect_sight") == f"{name}_perfect_sight"
+
+
+@pytest.mark.parametrize("name", ["ä" * 5000, "\0", "/dev/null/x", "a/" * 3000 + ".toml"])
+def test_a_motion_that_no_file_can_be_called_is_refused_by_its_station(name: str) -> None:
+    with pytest.raises(ConfigurationError, match="motions"):
+        station("irb140", name)

@@ -28,6 +28,7 @@ from qpsafe.sim.experiments.shared.ready import made_ready
 from qpsafe.sim.experiments.shared.report import Check, all_kept, summarise
 from qpsafe.sim.replay.settings import experiment_of, settings_of
 from qpsafe.sim.world.rays import SpotRays
+from qpsafe.sim.world.scene import build_scene
 from qpsafe.sim.world.tool_axis import tool_axis
 from qpsafe.tasks.program_file import parse_program
 
@@ -74,6 +75,9 @@ def test_its_sensors_look_outwards_and_do_not_see_the_robot(ready: Any) -> None:
     scene = experiment.scene
     seen = SpotRays(scene, spots).distances(scene.make_data(), robot.at(robot.home))
     assert (seen > spots.range_min).all()
+    alone = build_scene(robot, people=())
+    seen = SpotRays(alone, spots).distances(alone.make_data(), robot.at(robot.home))
+    assert (seen > spots.range_max).all()  # nor the pedestal, nor the floor
 
 
 def test_nobody_there_it_keeps_its_pose(ready: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.recording.run_file import (
     INPUTS,
     OUTPUTS,
+    PRINT,
     RunFile,
     RunFileError,
     StateRecorder,
@@ -33,7 +35,7 @@ from qpsafe.sim.recording.run_file import (
     read_run,
     write_run,
 )
-from qpsafe.sim.replay.replay import replay
+from qpsafe.sim.replay.replay import changed, replay
 from qpsafe.sim.replay.settings import experiment_of, settings_of
 from qpsafe.sim.replay.stage import Stage
 from qpsafe.sim.stories.file import parse_story
@@ -123,10 +125,41 @@ def test_other_words_and_messages_are_found(run: RunFile) -> None:
 @pytest.mark.slow
 def test_other_versions_and_robot_files_are_named(run: RunFile) -> None:
     versions = {**run.header["versions"], "numpy": "1.2.3"}
-    found = replay(replace(run, header={**run.header, "versions": versions, "robot_files": "0"}))
+    found = replay(replace(run, header={**run.header, "versions": versions, "robot_files": PRINT + "0"}))
     assert found.same
     assert found.changed[0] == f"numpy 1.2.3 then, {np.__version__} now"
     assert "robot irb140" in found.changed[1]
+
+
+def test_every_file_that_decides_is_named_wherever_it_lies_and_no_other(tmp_path: Path) -> None:
+    """A robot's folder whose model lies elsewhere, with sensors from a third place."""
+    folder, elsewhere = tmp_path / "robot", tmp_path / "elsewhere"
+    shutil.copytree(ROBOT.folder, folder)
+    elsewhere.mkdir()
+    model = elsewhere / "model.xml"
+    shutil.move(folder / ROBOT.model_path.name, model)
+    toml, spots = folder / "robot.toml", elsewhere / "mine.toml"
+    text = toml.read_text(encoding="utf-8")
+    toml.write_text(text.replace(f'model = "{ROBOT.model_path.name}"', f"model = {json.dumps(str(model))}"), "utf-8")
+    shutil.copy(folder / "spots.toml", spots)
+    experiment = FixedExperiment(qpsafe.load_robot(folder).with_spots(spots), duration=0.008)
+    write_run(tmp_path / "run.npz", experiment.run(), settings_of(experiment), experiment.robot)
+    run = read_run(tmp_path / "run.npz")
+
+    def said() -> tuple[str, ...]:
+        return changed(run, experiment)
+
+    assert said() == ()
+    for path, more in ((toml, "# x\n"), (model, "<!-- x -->"), (spots, "# x\n"), (folder / "spots.toml", "# x\n")):
+        before = path.read_bytes()
+        path.write_bytes(before + more.encode())
+        assert said() == ("the files of robot irb140 have changed",), path
+        path.write_bytes(before)
+    for name in ("cell.toml", "other.xml", "run.urdf"):
+        (folder / name).write_text("x", encoding="utf-8")
+    assert said() == ()
+    older = replace(run, header={**run.header, "robot_files": 64 * "0"})
+    assert changed(older, experiment) == ()
 
 
 def test_recorded_states_are_those_of_the_run(recorded, run: RunFile) -> None:

@@ -11,12 +11,16 @@ from typing import Any
 
 import made_up_values
 import pytest
+from amounts import some
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from qpsafe.errors import ConfigurationError, MissingExtraError
 from qpsafe.sim.campaign.executors import dask_executor
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.tuning.ask import BATCH
 from qpsafe.sim.tuning.journal import Journal
+from qpsafe.sim.tuning.objectives import Outcome
 from qpsafe.sim.tuning.play import Piece
 from qpsafe.sim.tuning.result import Tuned
 from qpsafe.sim.tuning.search import APART, JUDGE, MOST, SEARCH, Rungs, Search, run_search
@@ -167,3 +171,73 @@ def test_without_optuna_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(MissingExtraError, match=r"optuna: pip install 'qpsafe\[tune\]'"):
         run(trials=1 + 2 * BATCH)
+
+
+JUNK = st.sampled_from([None, True, "x", "1", -1, 1.5, [], [[]], {}, {"a": 1}, [None], float("nan"), float("inf")])
+
+
+def _spoilt(said: Any, data: st.DataObject) -> Any:
+    """A JSON value with something in it replaced, left out or added."""
+    inside = list(said.items() if isinstance(said, dict) else enumerate(said)) if isinstance(said, dict | list) else []
+    if not inside or data.draw(st.integers(0, 3)) == 0:
+        return data.draw(JUNK)
+    key, value = inside[data.draw(st.integers(0, min(len(inside), 8) - 1))]
+    other: Any = said.copy()
+    kind = data.draw(st.sampled_from(["deeper", "deeper", "gone", "more"]))
+    if kind == "deeper":
+        other[key] = _spoilt(value, data)
+    elif kind == "gone":
+        del other[key]
+    elif isinstance(said, dict):
+        other["more"] = data.draw(JUNK)
+    else:
+        other.append(data.draw(JUNK))
+    return other
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A journal with trials and finals."""
+    file = tmp_path_factory.mktemp("journal") / "search.jsonl"
+    kept = run(file, 1 + BATCH)
+    assert kept.reference is not None
+    kept.keep_finals({0: (0, kept.reference[0][:4]), 2: (0, kept.reference[0][:4])}, 1.0)
+    kept.keep_finals({0: (4, kept.reference[0][:2])}, 1.0)
+    return file
+
+
+@settings(max_examples=some(40, of=400), deadline=None)
+@given(st.data())
+def test_a_spoilt_line_is_named_or_says_what_it_did(written: Path, data: st.DataObject) -> None:
+    lines = written.read_text(encoding="utf-8").splitlines()
+    number = data.draw(st.integers(0, len(lines) - 1))
+    lines[number] = json.dumps(_spoilt(json.loads(lines[number]), data))
+    other = written.with_name("spoilt.jsonl")
+    other.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    try:
+        found = Journal(other, SEARCHED.identity())
+    except ConfigurationError as error:
+        assert "spoilt.jsonl: " in str(error)  # noqa: PT017
+        assert number == 0 or f"line {number + 1}" in str(error) or f"line {number + 2}" in str(error)  # noqa: PT017
+        return
+    assert all(isinstance(trial.number, int) and trial.score.violation >= 0.0 for trial in found.trials)
+    assert all(isinstance(one, Outcome) for runs in found.finals.values() for one in runs)
+    assert found.seconds >= 0.0 or number > 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "wrong"),
+    [
+        (['{"format": "qpsafe tuning 1"}'], "line 1"), ([None, ""], "line 2"), ([None, None], "line 2"),
+        ([None, '{"trials": []}'], "line 2.*seconds"), ([None, '{"trials": [{}], "seconds": 1}'], "line 2"),
+        ([None, '{"finals": {"x": [0, []]}, "seconds": 1}'], "line 2"), ([None, '{"seconds": NaN}'], "line 2"),
+        ([None, '{"finals": {"3": [5, []]}, "seconds": 1}'], "line 2.*go on from 0"), (["[]"], "line 1"),
+    ],
+)  # fmt: skip
+def test_the_line_that_is_none_of_its_own_is_named(tmp_path: Path, lines: list[str | None], wrong: str) -> None:
+    file = tmp_path / "search.jsonl"
+    Journal(file, {"a": 1})
+    first = file.read_text(encoding="utf-8").rstrip()
+    file.write_text("".join(f"{first if line is None else line}\n" for line in lines), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=rf"search.jsonl: {wrong}"):
+        Journal(file, {"a": 1})

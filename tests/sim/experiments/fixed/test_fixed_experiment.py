@@ -181,7 +181,8 @@ def test_report_notices_broken_promises(log: RunLog, experiment: FixedExperiment
     q = log.q_ref.copy()
     q[len(q) // 2 :, 2] += 1e-3  # a jump
     assert {"joint velocity limits", "joint acceleration limits"} & broken(replace(log, q_ref=q))
-    assert broken(replace(log, q_ref=log.q_ref + 3.0)) == {"joint position limits"}
+    assert broken(replace(log, q_ref=log.q_ref + 3.0, q=log.q + 3.0)) == {"joint position limits"}
+    assert broken(replace(log, q=log.q + 0.011)) == {"measured joints follow the commanded ones"}
     assert broken(log, log.board_distance + 0.1) == {"distance to the board"}
     regime = np.where(log.regime == "high", "medium", log.regime)
     assert "order of Table I" in broken(replace(log, regime=regime))
