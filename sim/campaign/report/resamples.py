@@ -64,7 +64,13 @@ class Ranks:
 
 
 def weights_of(trials: int, resamples: int, seed: int) -> Iterator[Array]:
-    """How often each trial is in each resample, (trials, some resamples), block by block."""
+    """How often each trial is in each resample, (trials, some resamples), block by block.
+
+    Args:
+        trials: How many there are to draw from.
+        resamples: How many in all.
+        seed: Of the draws.
+    """
     rng = np.random.default_rng(seed)
     size = max(_BLOCK // trials, 1)
     for first in range(0, resamples, size):
