@@ -184,7 +184,7 @@ def choose(
     while True:
         best = -1
         for i in range(count):
-            if marks[i] == 0 and (best < 0 or danger[i] > danger[best]):
+            if marks[i] == 0 and used[0, sensors[i], links[i]] < most and (best < 0 or danger[i] > danger[best]):
                 best = i
         if best < 0:
             return total
@@ -200,9 +200,6 @@ def choose(
                 marks[i], who = 1, sensors[i]
                 if used[1, who, link] != total:
                     used[0, who, link], used[1, who, link] = used[0, who, link] + 1, total
-        for i in range(count):
-            if links[i] == link and used[0, sensors[i], link] >= most:
-                marks[i] = 1
 
 
 @entry(types.int64(types.float64[:, :, ::1], _whole, types.int64, types.float64, types.int64[:, ::1]))
