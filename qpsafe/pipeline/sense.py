@@ -209,12 +209,12 @@ class Sense:
 
     def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
         """The points of a cloud that count, and that it was reduced."""
-        from qpsafe.ranging.reduction.cloud import check_size, reduced  # compiled when it is asked for
+        from qpsafe.ranging.reduction.cloud import check_size, reduced, reduction  # compiled when it is asked for
 
         check_size(given)
         wire = self._robot.at(as_joint_position(q, self._robot)).wire(as_joint_velocity(qd, self._robot))
         kept = reduced(given, wire)
-        return kept, (f"{counted(len(given), 'point')} are reduced to those nearest to the links, {len(kept)}",)
+        return kept, (reduction(len(given), len(kept)),)
 
     def _with(
         self, capped: bool, notes: tuple[str, ...], more: Ranged, spots: tuple[str, ...] = ()

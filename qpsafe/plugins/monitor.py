@@ -17,7 +17,7 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.limits import Box, JointLimits, checked_limits
 from qpsafe.pipeline.checks import checked_dt, checked_evasion, checked_field, checked_robot, own_evasion
 from qpsafe.pipeline.sense import CLOUD
-from qpsafe.ranging.reduction.cloud import check_size, reduced
+from qpsafe.ranging.reduction.cloud import check_size, reduced, reduction
 from qpsafe.robot.robot import Robot
 from qpsafe.robot.state import RobotState
 from qpsafe.robot.wire import Wire
@@ -223,7 +223,7 @@ class DangerMonitor:
         if given <= CLOUD:
             return points, ""
         points = reduced(points, wire)
-        return points, f"{given} points are reduced to those nearest to the links, {len(points)}"
+        return points, reduction(given, len(points))
 
     def _ramped(self, switches: tuple[float, ...]) -> tuple[float, ...]:
         """Fall within a few ticks, with the time constant ramp / 25; rise by at most dt / ramp.

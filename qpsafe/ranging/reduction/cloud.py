@@ -32,6 +32,11 @@ def check_size(points: Array) -> None:
         raise BadInput(f"{counted(len(points), 'point')} are given, expected {expected}")
 
 
+def reduction(given: int, kept: int) -> str:
+    """That so many points were reduced, in words."""
+    return f"{counted(given, 'point')} are reduced to those nearest to the links, {kept}"
+
+
 def reduced(points: Array, wire: Wire) -> Array:
     """The points of a cloud that are nearest to each link of the wire, as of an image (c, 3) [m].
 

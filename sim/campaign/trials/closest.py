@@ -20,6 +20,7 @@ from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 from qpsafe.sim.engine import nearest
 from qpsafe.sim.engine.nearest import robot_to_people
+from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
@@ -76,7 +77,7 @@ def closest(station: Station, q: Array, tracks: PersonTracks, at_most: float = n
         ValueError: Fewer ticks of people than of the robot: compiled code would read beyond them.
     """
     if len(q) > len(tracks.ends):
-        raise ValueError(f"{len(q)} ticks of a robot, {len(tracks.ends)} of people")
+        raise ValueError(f"a robot's way has {counted(len(q), 'tick')}, that of people {len(tracks.ends)}")
     ticks, (world, robot) = len(q), (station.world, station.robot)
     found, which = np.full((ticks, 7), np.nan), np.empty((ticks, 2), dtype=np.int64)
     boards = tracks.boards
