@@ -42,7 +42,6 @@ from qpsafe.sensing.detection import (
 )
 from qpsafe.sensing.health import CLEAR
 from qpsafe.sensing.sensing import DistanceSensing
-from qpsafe.text.words import counted
 
 if TYPE_CHECKING:
     from qpsafe.ranging.ranging import RangeSensing
