@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import pytest
+from _pytest.mark import ParameterSet
 
 #: Set by tests/conftest.py before tests are collected.
 VARIABLE, FEW, ALL = "QPSAFE_DRAWN", "few", "all"
@@ -21,6 +22,17 @@ def first(count: int, values: Iterable[Any]) -> list[Any]:
     """Values of a parameter, all but the first ones marked slow; tuples are values of several parameters."""
     chosen = [value if isinstance(value, tuple) else (value,) for value in values]
     return [pytest.param(*value, marks=pytest.mark.slow if k >= count else ()) for k, value in enumerate(chosen)]
+
+
+def thinned(step: int, values: Iterable[Any]) -> list[Any]:
+    """Values of one parameter, all but every so-manieth marked slow: for families of many that are alike."""
+    return [
+        pytest.param(*value.values, marks=(*value.marks, *marks), id=value.id)
+        if isinstance(value, ParameterSet)
+        else pytest.param(value, marks=marks)
+        for k, value in enumerate(values)
+        for marks in [(pytest.mark.slow,) if k % step else ()]
+    ]
 
 
 def crossed(one: Iterable[Any], other: Iterable[Any]) -> list[Any]:

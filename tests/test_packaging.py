@@ -192,9 +192,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(ROOT / name, copy)
     for name in FOLDERS.values():
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]"))
-    options = ["--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--quiet"]
-    command = [sys.executable, "-m", "pip", "wheel", *options, "--wheel-dir", str(out), str(copy)]
-    subprocess.run(command, check=True, timeout=300)
+    code = f"from setuptools import build_meta; build_meta.build_wheel({str(out)!r})"  # as pip would, in half the time
+    subprocess.run([sys.executable, "-c", code], cwd=copy, check=True, timeout=300, capture_output=True)
     (path,) = out.glob("*.whl")
     return path
 
@@ -231,6 +230,7 @@ def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None
     assert any(name.startswith(information) and name.endswith("/LICENSE") for name in names)
 
 
+@pytest.mark.slow
 def test_the_wheel_works_away_from_the_tree(wheel: Path, tmp_path: Path) -> None:
     zipfile.ZipFile(wheel).extractall(tmp_path)
     code = (

@@ -122,7 +122,7 @@ def refuse_endless(context: typer.Context) -> None:
         found = context.params.get(str(parameter.name))
         for value in found if isinstance(found, list | tuple) else (found,):
             if isinstance(value, float) and not math.isfinite(value) and value != parameter.default:
-                raise ConfigurationError(context.command_path, parameter.opts[0], value, "a finite number")
+                raise ConfigurationError(f"qpsafe {_path(context)}", parameter.opts[0], value, "a finite number")
 
 
 def refuse_unused(context: typer.Context) -> None:
@@ -140,7 +140,7 @@ def refuse_unused(context: typer.Context) -> None:
             if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE":
                 option, value = found[name].opts[0], context.params[name]
                 value = str(value) if hasattr(value, "__fspath__") else getattr(value, "value", value)
-                raise ConfigurationError(context.command_path, option, value, rule.expected)
+                raise ConfigurationError(f"qpsafe {_path(context)}", option, value, rule.expected)
 
 
 def _path(context: Any) -> str:

@@ -276,6 +276,7 @@ PAGES: dict[str, Callable[[], list[str]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_sentences_say_what_was_measured(page: str) -> None:
     assert unsaid(page, PAGES[page]()) == []

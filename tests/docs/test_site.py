@@ -48,6 +48,7 @@ def test_every_public_name_has_a_place(tmp_path: Path) -> None:
     assert {targets()[name] for name in names} <= documented
 
 
+@pytest.mark.slow
 def test_what_is_exported_is_where_the_catalogue_says() -> None:
     for name, module in exported().items():
         assert getattr(qpsafe, name) is getattr(sys.modules[module], name)
@@ -72,6 +73,7 @@ def test_no_docstring_has_links_of_another_tool() -> None:
     ] == []
 
 
+@pytest.mark.slow
 def test_backticks_become_links_where_they_name_something() -> None:
     scopes = ["qpsafe.SafetyController", "qpsafe.controller"]
     assert marked("`step` asks", scopes) == ":py:obj:`step <qpsafe.SafetyController.step>` asks"

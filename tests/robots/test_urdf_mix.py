@@ -28,7 +28,7 @@ def load(path: Path, **more: Any) -> Robot:
         return load_robot(path, **more)
 
 
-@pytest.mark.parametrize("start", first(2, range(0, SEEDS, 20)))
+@pytest.mark.parametrize("start", first(1, range(0, SEEDS, 20)))
 def test_a_mixed_urdf_is_what_pinocchio_reads_or_is_refused(start: int, tmp_path: Path, urdf_writer: Any) -> None:
     loaded = refused = 0
     for seed in range(start, start + 20):

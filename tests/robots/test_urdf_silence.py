@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -66,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("silence")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(24, of=60), deadline=None)
 @given(st.sampled_from(list(SHAPES)), st.data())
 def test_blanks_around_numbers_change_nothing(folder: Path, form: str, data: st.DataObject) -> None:
     words = [data.draw(NUMBERS) for _ in range(SHAPES[form])]
@@ -152,7 +153,7 @@ def test_a_link_does_not_take_the_name_of_the_world(name: str, tmp_path: Path) -
 
 
 @given(st.floats(-300.0, 300.0), st.integers(0, 2))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=some(16, of=40), deadline=None)
 def test_an_axis_of_any_length_is_the_same_joint_or_refused_by_name(folder: Path, power: float, index: int) -> None:
     direction = np.roll([1.0, 2.0, -0.5], index)
     words = " ".join(repr(float(x)) for x in direction * 10.0**power)
@@ -247,7 +248,7 @@ NAMES = st.text(st.characters(exclude_categories=("Cs", "Cn"), exclude_character
 TINY = st.floats(-14.0, 0.0).map(lambda power: 10.0**power)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=some(24, of=60), deadline=None)
 @given(NAMES, TINY, TINY, st.floats(-3.0, 3.0))
 def test_a_starting_file_reads_back_whatever_the_names_and_however_small_the_ranges(
     folder: Path, name: str, span: float, speed: float, lower: float

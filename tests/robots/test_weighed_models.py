@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -54,7 +55,7 @@ def mass_matrices(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return upper + np.triu(upper, 1).T, theirs
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(
     st.lists(st.tuples(st.sampled_from([0.0, 0.3, 5.0]), st.booleans()), min_size=1, max_size=7), st.integers(0, 2**31)
 )

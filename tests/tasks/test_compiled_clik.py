@@ -26,7 +26,7 @@ angles = st.sampled_from([0.0, 1e-9, 1e-5, 3.14, np.pi - 1e-6]) | st.floats(0.0,
 
 
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: f"{task.name} of {task.frame}")
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(st.integers(0, 2**32 - 1), angles)
 def test_clik_is_what_the_methods_say(task: Task, seed: int, angle: float) -> None:
     rng = np.random.default_rng(seed)

@@ -47,7 +47,7 @@ MOVES: dict[str, Move] = {
 
 
 @given(data=st.data(), n=st.integers(1, 4))
-@settings(deadline=None, max_examples=some(20, of=60))
+@settings(deadline=None, max_examples=some(10, of=60))
 def test_a_time_law_leads_from_any_state_to_rest_within_its_rates(data: st.DataObject, n: int) -> None:
     start, goal, velocity, acceleration = (
         np.array(data.draw(st.lists(finite, min_size=n, max_size=n))) * scale for scale in (1.0, 1.0, 0.4, 1.0)
@@ -130,7 +130,7 @@ PROGRAM = Program([Line(A, B), Dwell(B, 0.3), Arc(B, (0.6, 0.1, 0.5), A)], [(1, 
 
 
 @given(stops=st.lists(st.tuples(st.integers(1, 80), st.integers(0, 50)), min_size=1, max_size=8))
-@settings(deadline=None, max_examples=some(15, of=40))
+@settings(deadline=None, max_examples=some(8, of=40))
 def test_a_pause_at_any_instant_leaves_no_trace(stops: list[tuple[int, int]]) -> None:
     """With a clock that stands still, the samples after a pause are bit by bit those of the run without."""
     dt, k = 0.02, 0
@@ -199,7 +199,7 @@ def test_moves_that_cannot_be_are_refused_by_name(bad: object, key: str) -> None
 anything = st.floats(-300.0, 300.0).map(lambda x: 10.0**x) | st.floats(1e-3, 1e3)
 
 
-@settings(max_examples=some(50, of=150))
+@settings(max_examples=some(25, of=150))
 @given(st.floats(1e-6, 1e3), anything, anything, anything)  # ruckig's own precision is 1e-8
 def test_any_motion_arrives_or_is_refused_by_name(
     length: float, speed: float, acceleration: float, jerk: float
@@ -222,7 +222,7 @@ def test_any_motion_arrives_or_is_refused_by_name(
 rates = st.builds(Rates, *[st.floats(1e-4, 1e2)] * 3)
 
 
-@settings(max_examples=some(20, of=60))
+@settings(max_examples=some(10, of=60))
 @given(rates, rates, st.floats(0.0, 1.0), st.floats(0.01, 3.0))
 def test_a_path_is_checked_densely_and_no_more_often_than_its_way_needs(
     linear: Rates, angular: Rates, length: float, angle: float

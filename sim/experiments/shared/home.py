@@ -205,7 +205,7 @@ def shortcomings(robot: Robot, q: Array, touching: Touching | None = None) -> tu
             said.append(f"{arm.tool} is {100 * ahead:.0f} % of the arm's length ahead of its shoulder")
         off = float(np.arccos(np.clip(-(pose[:3, :3] @ tool_axis(robot, arm.tool))[2], -1.0, 1.0)))
         if not off <= DOWN:
-            said.append(f"{arm.tool} points off down by {np.degrees(off):.0f} deg")
+            said.append(f"{arm.tool} looks off down by {np.degrees(off):.0f} deg")
         if not _dexterity(robot, arm, q) >= CLEAR:
             said.append(f"{arm.tool} is near a singular pose")
     margins = _margins(robot, q)

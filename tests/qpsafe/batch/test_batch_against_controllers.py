@@ -46,7 +46,7 @@ def test_fixed_poses_give_the_same_bits(pairs: Any, come: Any, name: str, count:
     tasks, tools = fixed_tasks(robot, count), len(robot.tool_frames)
     activation = qpsafe.robot_activation(robot, tools, tools) if tools > 1 else None
     loop = pairs(lambda: qpsafe.SafetyController(robot, tasks, activation=activation), 6)
-    ticks = 450
+    ticks = some(300, of=450)
     points = come(robot, 6, ticks)
     for k in range(ticks):
         for r in (2, 4):
@@ -102,21 +102,21 @@ def test_sick_sensors_are_the_robots_own(pairs: Any, irb140: Any) -> None:
     soon = qpsafe.RecoveryRules.paper()  # on the way back
     loop = pairs(lambda: qpsafe.SafetyController(irb140, fixed_tasks(irb140), recovery=soon), 8)
     rng, k_spots, told = np.random.default_rng(2), len(loop.controllers[0].spots), [set() for _ in range(8)]
-    for k in range(700):
-        base = 0.55 + 0.3 * np.cos(0.015 * k + np.arange(8))[:, None] + rng.normal(0.0, 2e-3, (8, k_spots))
+    for k in range(460):
+        base = 0.55 + 0.3 * np.cos(0.02 * k + np.arange(8))[:, None] + rng.normal(0.0, 2e-3, (8, k_spots))
         ages = np.full((8, k_spots), 0.004)
         distances = np.where(base > 0.78, np.inf, base)
-        distances[1, 3] = np.nan if 100 < k < 160 else distances[1, 3]
-        distances[2, :8] = np.nan if 200 < k < 230 else distances[2, :8]
-        distances[3] = 0.5 if 250 < k < 320 else distances[3]
-        ages[4, ::4] = 0.5 if 300 < k < 303 else 0.0
-        distances[5, 2] = -1.0 if k > 350 else distances[5, 2]
+        distances[1, 3] = np.nan if 60 < k < 120 else distances[1, 3]
+        distances[2, :8] = np.nan if 130 < k < 160 else distances[2, :8]
+        distances[3] = 0.5 if 160 < k < 230 else distances[3]
+        ages[4, ::4] = 0.5 if 200 < k < 203 else 0.0
+        distances[5, 2] = -1.0 if k > 220 else distances[5, 2]
         distances[6, 7] = 42.0
-        if k == 500:
+        if k == 320:
             loop.batch.acknowledge()
             for controller in loop.controllers:
                 controller.acknowledge()
-        if k == 600:
+        if k == 400:
             loop.batch.reseed(np.arange(8) % 2 == 0)
             for controller in loop.controllers[::2]:
                 controller.reseed()
@@ -142,7 +142,7 @@ def test_goals_out_of_reach_are_told_and_taken_back(pairs: Any, come: Any, irb14
     assert told == {(), ("held: it moved without getting nearer to its goals",)}
 
 
-@settings(max_examples=some(3, of=12), deadline=None)
+@settings(max_examples=some(2, of=12), deadline=None)
 @given(st.data())
 def test_any_plain_parts_give_the_same_bits(pairs: Any, come: Any, irb140: Any, data: Any) -> None:
     """Rows, gains, thresholds, rules, admittance, limits and sensing as they come."""
@@ -182,13 +182,13 @@ def test_any_plain_parts_give_the_same_bits(pairs: Any, come: Any, irb140: Any, 
 def test_clocks_are_paused_and_robots_reset_one_by_one(pairs: Any, come: Any, irb140: Any) -> None:
     path = program(irb140, True)
     loop = pairs(lambda: qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", path)]), 4, 1e-9)
-    points = come(irb140, 4, 500)
-    for k in range(500):
-        if k in (100, 200):
+    points = come(irb140, 4, 300)
+    for k in range(300):
+        if k in (60, 120):
             for r in (0, 2):
-                (loop.controllers[r].pause if k == 100 else loop.controllers[r].resume)()
-            (loop.batch.pause if k == 100 else loop.batch.resume)([0, 2])
-        if k == 300:
+                (loop.controllers[r].pause if k == 60 else loop.controllers[r].resume)()
+            (loop.batch.pause if k == 60 else loop.batch.resume)([0, 2])
+        if k == 180:
             loop.controllers[3].reset()
             loop.batch.reset([3])
         loop.step(lambda r, k=k: {"points": points[r][k]})
@@ -197,6 +197,7 @@ def test_clocks_are_paused_and_robots_reset_one_by_one(pairs: Any, come: Any, ir
 HANDS, HAND = (54, 287), 500  # seeds of such hands, and for how many ticks they are there
 
 
+@pytest.mark.slow
 def test_a_way_back_that_limits_block_goes_through_the_joints(pairs: Any, irb140: Any) -> None:
     """Hands around the tool that leave the arm where the straight way back is blocked."""
     rules = qpsafe.RecoveryRules(patience=0.2)
@@ -214,6 +215,8 @@ def test_a_way_back_that_limits_block_goes_through_the_joints(pairs: Any, irb140
         ]
         loop.step(lambda r, seen=seen: {"points": seen[r]})
         led = [much + (loop.controllers[r].recovery.way is not None) for r, much in enumerate(led)]
+        if min(led) > 200 and all(controller.recovery.phase == "following" for controller in loop.controllers):
+            break
     assert min(led) > 200
     assert [controller.recovery.phase for controller in loop.controllers] == ["following"] * 2
 
@@ -233,8 +236,9 @@ def test_rows_that_keep_clear_give_the_same_bits(pairs: Any, come: Any, name: st
     ]
     activation = qpsafe.robot_activation(robot, tools, tools) if tools > 1 else None
     loop = pairs(lambda: qpsafe.SafetyController(robot, tasks, law, known=[table], activation=activation), 3)
-    points, rows = come(robot, 3, 350), 0
-    for k in range(350):
+    ticks = some(220, of=350)
+    points, rows = come(robot, 3, ticks), 0
+    for k in range(ticks):
         loop.step(lambda r, k=k: {"points": points[r][k]})
         rows += any(limit.level(robot.at(q), qd, controller.limits) is not None for q, qd, controller, limit in
                     ((loop.q[r], loop.qd[r], c, c.clearance) for r, c in enumerate(loop.controllers)))  # fmt: skip

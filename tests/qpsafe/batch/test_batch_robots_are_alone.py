@@ -85,7 +85,7 @@ def test_points_as_lists_and_with_rows_of_nan_are_the_same(controller: Any) -> N
 numbers = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-3.0, 3.0)
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(arrays.arrays(float, (4, 6), elements=numbers), arrays.arrays(float, (4, 20), elements=numbers), st.booleans())
 def test_no_data_raise_or_lead_beyond_the_limits(controller: Any, q: np.ndarray, seen: np.ndarray, aged: bool) -> None:
     batch, robot = qpsafe.BatchController(controller, 4), controller.robot

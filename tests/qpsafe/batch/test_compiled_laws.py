@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import crossed
 
 import qpsafe
 from qpsafe.batch import blocks, code, cuts
@@ -25,8 +26,7 @@ def tasks_of(robot: Any) -> list[Any]:
     return [kind(*goal) for kind in (qpsafe.PositionTask, qpsafe.OrientationTask) for goal in goals.items()]
 
 
-@pytest.mark.parametrize("name", ["irb140", "iiwa14"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("name", "law"), crossed(["irb140", "iiwa14"], LAWS))
 def test_every_law_gives_the_same_bits(name: str, law: str) -> None:
     """Approach, suspension, recovery, a stand, bad joints in between: commands, danger, errors and status."""
     robot = qpsafe.load_robot(name)

@@ -3,6 +3,7 @@
 import coal
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -71,7 +72,7 @@ def test_robots_can_keep_their_home_pose(name):
 
 
 @pytest.mark.slow
-@settings(max_examples=5)
+@settings(max_examples=some(2, of=5))
 @given(st.integers(0, 10**6))
 def test_the_distance_is_coals_and_nothing_between_two_moments_is_nearer(seed):
     """Coal at 400 moments of the program itself finds nothing nearer, and at some moment the same."""
@@ -117,7 +118,7 @@ def convex(vertices):
     return coal.Convex.convexHull(points, False, "Qt")
 
 
-@settings(max_examples=12)
+@settings(max_examples=some(5, of=12))
 @given(st.floats(0.05, 0.95), st.floats(0.001, 0.01))
 def test_what_is_thin_is_not_stepped_over(share, thickness):
     """A small plate that the needle's tip goes through between two moments 60 mm apart."""
@@ -129,7 +130,7 @@ def test_what_is_thin_is_not_stepped_over(share, thickness):
     assert "furniture" in wrong(result)
 
 
-@settings(max_examples=6)
+@settings(max_examples=some(2, of=6))
 @given(st.floats(0.3, 1.5))
 def test_a_table_in_the_way_is_named_with_time_and_place(share):
     """The tool goes down onto a table; how deep it gets is known from the line, and when it is too near."""
@@ -153,7 +154,7 @@ def test_too_fast_and_too_hard_for_a_joint():
     assert [wrong(check_path(ROBOT, program)) for program in (quick, hard, good)] == [["joints"], ["joints"], []]
 
 
-@settings(max_examples=6)
+@settings(max_examples=some(2, of=6))
 @given(st.floats(-0.3, 0.3))
 def test_a_program_up_to_a_joint_limit_touches_it_and_past_it_is_out_of_reach(before):
     goal = ROBOT.home.copy()
@@ -169,7 +170,7 @@ def test_a_program_up_to_a_joint_limit_touches_it_and_past_it_is_out_of_reach(be
         assert wrong(result) == []
 
 
-@settings(max_examples=4)
+@settings(max_examples=some(2, of=4))
 @given(st.floats(0.2, 0.8))
 def test_a_stretched_wrist_is_singular(bend):
     goal = ROBOT.home.copy()
@@ -195,7 +196,7 @@ def test_a_robot_that_would_meet_itself():
     assert found == 2
 
 
-@settings(max_examples=15)
+@settings(max_examples=some(6, of=15))
 @given(st.integers(0, 19), st.floats(0.05, 0.25))
 def test_a_spot_that_sees_furniture_nearer_than_d_min_is_named(number, distance):
     """A plate across the axis of a spot: what it reads is known."""

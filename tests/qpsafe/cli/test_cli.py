@@ -101,6 +101,7 @@ def test_demo_without_opengl_says_so_in_one_line(without_display: Callable[..., 
     assert "MUJOCO_GL" in lines[0]
 
 
+@pytest.mark.slow
 def test_interrupted_demo_leaves_no_files(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [*PROGRAM, "demo", "fixed", "--out", str(tmp_path / "out")],

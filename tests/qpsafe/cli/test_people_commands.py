@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from amounts import first
 from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
@@ -28,7 +29,7 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.stdout
 
 
-@pytest.mark.parametrize("path", STORIES, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", first(1, STORIES), ids=lambda path: path.name)
 def test_bundled_stories_are_sound_and_drawn(path: Path, tmp_path: Path) -> None:
     code, text = run("story", str(path), "--json", "--plot", str(tmp_path / "plan.png"))
     found = json.loads(text)
@@ -51,7 +52,8 @@ def test_a_wrong_story_is_refused_before_anything_is_written(tmp_path: Path) -> 
     assert not out.exists()
 
 
-@pytest.mark.parametrize("kind", ["fixed", pytest.param("path", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["fixed", "path"])
 def test_a_demo_with_a_story_says_how_near_people_came(tmp_path: Path, kind: str) -> None:
     path, out = tmp_path / "near.toml", tmp_path / "out"
     path.write_text('[[person]]\nname = "A"\nstart = [1.0, 0.0]\n[[person.step]]\ndo = "wait"\ntime = 3.0\n')

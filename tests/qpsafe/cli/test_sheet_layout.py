@@ -15,7 +15,7 @@ words = st.text(st.sampled_from("ab1.[]/:+-"), min_size=1, max_size=9)
 cells = st.lists(words, min_size=1, max_size=4).map(" ".join)
 
 
-@settings(max_examples=some(20, of=60))
+@settings(max_examples=some(10, of=60))
 @given(data=st.data(), width=st.integers(44, 120))
 def test_no_word_of_a_sheet_is_lost_or_cut(whole: Callable[[Sheet, int], str], data: st.DataObject, width: int) -> None:
     count = data.draw(st.integers(1, 9))

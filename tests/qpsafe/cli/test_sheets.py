@@ -15,7 +15,7 @@ from typing import Any
 import made_up_trials
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, thinned
 from rich.cells import cell_len
 from rich.console import Console
 
@@ -315,7 +315,7 @@ def test_no_table_is_forgotten_and_none_is_made_otherwise() -> None:
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS))
-@pytest.mark.parametrize("show", dict.fromkeys(TABLES.values()), ids=lambda show: show.__name__)
+@pytest.mark.parametrize("show", thinned(2, dict.fromkeys(TABLES.values())), ids=lambda show: show.__name__)
 def test_every_table_is_whole_on_a_narrow_screen(
     show: Show,
     width: int,

@@ -29,7 +29,7 @@ def pushed(robot: Any, state: Any, wire: Wire, points: np.ndarray, links: np.nda
     return values, vectors, torque, cdf_n
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(seeds, st.integers(0, 25))
 def test_push_is_its_equations(irb140: Any, seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -73,7 +73,7 @@ def nearest_by_numpy(points: np.ndarray, wire: Wire) -> np.ndarray:
     return np.argmax(distance2 <= (1.0 + 1e-9) * np.min(distance2, axis=1, keepdims=True) + 1e-18, axis=1)
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(seeds)
 def test_the_nearest_link_and_of_equals_the_first(irb140: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)

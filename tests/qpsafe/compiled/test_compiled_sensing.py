@@ -104,7 +104,7 @@ def drifting(rng: np.random.Generator, ticks: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("velocities", [False, True])
-@settings(max_examples=some(3, of=8), deadline=None)
+@settings(max_examples=some(2, of=8), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_every_tick_is_what_the_rules_say(irb140: Any, velocities: bool, seed: int, own: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import thinned
 
 import qpsafe
 from qpsafe.hqp.own import regimes
@@ -93,7 +94,7 @@ BOXES: dict[str, Any] = {  # of the right one at a tick
 
 
 @pytest.mark.parametrize("law", [None, qpsafe.NullspaceLaw()])
-@pytest.mark.parametrize("kind", BOXES)
+@pytest.mark.parametrize("kind", thinned(2, BOXES))
 def test_a_box_beyond_the_numbers_of_its_limits_is_a_fault(run: Any, irb140: Any, kind: str, law: Any) -> None:
     """`run` watches that no command leaves the robot's limits."""
 
@@ -165,7 +166,7 @@ def near(loop: Any) -> np.ndarray:
     return loop.robot.pose("tcp", loop.q)[:3, 3] + np.array([[0.2, 0.02, 0.0], [0.3, 0.1, 0.0], [0.4, 0.0, 0.1]])
 
 
-@pytest.mark.parametrize("kind", SPOILT)
+@pytest.mark.parametrize("kind", thinned(2, SPOILT))
 @pytest.mark.parametrize("part", PARTS)
 def test_an_answer_that_is_no_array_of_its_numbers_is_a_fault(run: Any, irb140: Any, part: str, kind: str) -> None:
     spoiler = Spoiler(part)
@@ -181,7 +182,7 @@ def test_an_answer_that_is_no_array_of_its_numbers_is_a_fault(run: Any, irb140: 
     assert loop.step(near(loop)).status == "ok"
 
 
-@pytest.mark.parametrize("kind", FAIR)
+@pytest.mark.parametrize("kind", thinned(2, FAIR))
 @pytest.mark.parametrize("part", PARTS)
 def test_how_an_answer_lies_in_memory_does_not_matter(run: Any, irb140: Any, part: str, kind: str) -> None:
     spoiler = Spoiler(part)

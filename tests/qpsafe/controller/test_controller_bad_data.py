@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import some, thinned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -145,7 +145,7 @@ def arguments(argument: str, value: Any, q: np.ndarray, qd: np.ndarray) -> dict[
     return data | ({} if argument in ("distances", "points") else {"distances": CLEAR}) | {argument: value}
 
 
-@pytest.mark.parametrize(("argument", "value", "words"), cases())
+@pytest.mark.parametrize(("argument", "value", "words"), thinned(2, cases()))
 def test_reported_braked_held_and_resumed(run: Any, argument: str, value: Any, words: str) -> None:
     loop = run(FAST)
     loop.stir(12)
@@ -172,7 +172,7 @@ def test_reported_braked_held_and_resumed(run: Any, argument: str, value: Any, w
     assert np.abs(loop.qd).max() > 0.0  # it moves: back to where the point drove it from
 
 
-@pytest.mark.parametrize(("argument", "value", "words"), cases())
+@pytest.mark.parametrize(("argument", "value", "words"), thinned(2, cases()))
 def test_reported_in_the_very_first_tick(run: Any, argument: str, value: Any, words: str) -> None:
     loop = run(FAST)
     measured = loop.robot.home + 0.1
@@ -321,7 +321,7 @@ anything = st.one_of(
 )
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(st.lists(st.tuples(anything, anything, anything, st.none() | anything), min_size=1, max_size=6), st.booleans())
 def test_anything_at_all(run: Any, data: list[tuple[Any, Any, Any, Any]], stirred: bool) -> None:
     loop = run(FAST)

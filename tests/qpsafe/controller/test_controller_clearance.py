@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, some
 from clearance_runs import MARGIN, NOBODY, controller_at, distances, kept, run, tasks_at
 
 import qpsafe
@@ -23,12 +23,16 @@ def test_tasks_that_lead_into_things_do_not_touch_them(name: str) -> None:
     """Goals at random, half a metre away in an instant; without rows the same tasks do touch. Speeds are such that the
     arm turns by a lot while it brakes, which is what the millimetre is for."""
     robot = qpsafe.load_robot(name)
-    with_rows, without = ([kept(robot, seed, clearance=clearance) for seed in range(6)] for clearance in (None, "off"))
+    with_rows, without = (
+        [kept(robot, seed, clearance=clearance) for seed in range(some(3, of=6))] for clearance in (None, "off")
+    )
     assert min(found[0] for found in with_rows if found is not None) > MARGIN - 1.5e-3
     assert min(found[0] for found in without if found is not None) < 0.0
 
 
-@pytest.mark.parametrize("law", [qpsafe.HierarchicalLaw(), qpsafe.HierarchicalLaw("paper"), qpsafe.WeightedLaw()])
+@pytest.mark.parametrize(
+    "law", first(1, [qpsafe.HierarchicalLaw(), qpsafe.HierarchicalLaw("paper"), qpsafe.WeightedLaw()])
+)
 def test_evasion_stops_at_a_table(law: Any) -> None:
     """Somebody comes from above: the arm is pushed down, and lies on the margin; without rows it goes through."""
     robot = qpsafe.load_robot("irb140")
@@ -106,11 +110,14 @@ class OwnWeighted(qpsafe.WeightedLaw):
 
 @pytest.mark.parametrize(
     ("law", "own"),
-    [
-        (qpsafe.HierarchicalLaw(), Own()),
-        (qpsafe.HierarchicalLaw("paper"), Own("paper")),
-        (qpsafe.WeightedLaw(), OwnWeighted()),
-    ],
+    first(
+        2,
+        [
+            (qpsafe.HierarchicalLaw(), Own()),
+            (qpsafe.WeightedLaw(), OwnWeighted()),
+            (qpsafe.HierarchicalLaw("paper"), Own("paper")),
+        ],
+    ),
 )
 def test_the_compiled_call_is_the_law_under_the_same_rows(law: Any, own: Any) -> None:
     """Tick by tick from the same state: command, and what is told of each regime, soft level first."""

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import first, some
 
 import qpsafe
 from qpsafe.sensing.detection import nearest_link
@@ -39,7 +39,7 @@ def trajectory(loop: Any, steps: Any) -> list[bytes]:
     return found
 
 
-@pytest.mark.parametrize("key", LAWS)
+@pytest.mark.parametrize("key", first(2, LAWS))
 def test_equal_input_gives_equal_bits_also_after_a_reset(run: Any, irb140: Any, key: str) -> None:
     steps = wandering(irb140, 200, 3)
     one, other = run(LAWS[key]()), run(LAWS[key]())
@@ -63,7 +63,7 @@ def test_reset_forgets_held_points(run: Any) -> None:
     assert loop.step(distances=np.full_like(near, np.inf)).cdf_n == 0.0
 
 
-@pytest.mark.parametrize("key", LAWS)
+@pytest.mark.parametrize("key", first(2, LAWS))
 def test_the_order_of_points_does_not_matter(run: Any, irb140: Any, key: str) -> None:
     rng = np.random.default_rng(5)
     for points in wandering(irb140, some(10, of=60), 8, seed=2):
@@ -76,7 +76,7 @@ def test_the_order_of_points_does_not_matter(run: Any, irb140: Any, key: str) ->
         assert np.abs(here.reference.qd - there.reference.qd).max() < 1e-12
 
 
-@pytest.mark.parametrize("key", LAWS)
+@pytest.mark.parametrize("key", first(2, LAWS))
 def test_the_order_of_points_does_not_matter_over_a_run(run: Any, irb140: Any, key: str) -> None:
     rng = np.random.default_rng(6)
     one, other = run(LAWS[key]()), run(LAWS[key]())
@@ -151,7 +151,7 @@ def rotated(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-@pytest.mark.parametrize("key", LAWS)
+@pytest.mark.parametrize("key", first(2, LAWS))
 def test_turning_the_world_about_the_first_axis_turns_the_motion(run: Any, irb140: Any, key: str) -> None:
     """Joint 1 is vertical: home, goal and obstacle turned by an angle give the same joint velocities."""
     angle = 0.7
@@ -170,7 +170,7 @@ def test_turning_the_world_about_the_first_axis_turns_the_motion(run: Any, irb14
     assert fastest > 0.1
 
 
-@pytest.mark.parametrize("key", LAWS)
+@pytest.mark.parametrize("key", first(2, LAWS))
 def test_a_mirrored_world_gives_mirrored_motion(run: Any, irb140: Any, key: str) -> None:
     """The IRB 140's wire and limits are their own mirror image in the plane y = 0: joints 1, 4 and 6 change sign."""
     mirror = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first, some
 
 import qpsafe
 from qpsafe.errors import ConfigurationError
@@ -18,7 +19,7 @@ LAWS = {
     "weighted": qpsafe.WeightedLaw,
     "nullspace": qpsafe.NullspaceLaw,
 }
-OTHERS, SLOW = [key for key in LAWS if key != "strict"], pytest.mark.slow
+OTHERS = [key for key in LAWS if key != "strict"]
 
 
 def braked_way(speed: float, deceleration: float, dt: float) -> float:
@@ -38,7 +39,11 @@ def near_a_limit(robot: Any, q: np.ndarray, qd: np.ndarray, share: float, dt: fl
 
 
 @pytest.mark.parametrize(
-    ("key", "share"), [("strict", 0.2), *((k, 0.5) for k in LAWS), *(pytest.param(k, 0.2, marks=SLOW) for k in OTHERS)]
+    ("key", "share"),
+    first(
+        2,
+        [("strict", 0.2), ("weighted", 0.5), *((k, 0.5) for k in LAWS if k != "weighted"), *((k, 0.2) for k in OTHERS)],
+    ),
 )
 def test_accelerations_stay_under_their_share_whatever_danger_does(
     run: Any, irb140: Any, key: str, share: float
@@ -48,7 +53,7 @@ def test_accelerations_stay_under_their_share_whatever_danger_does(
     rng, dt, largest, hardest = np.random.default_rng(3), loop.controller.dt, 0.0, 0.0
     tip = irb140.pose("tcp", irb140.home)[:3, 3]
     points: np.ndarray = np.zeros((0, 3))
-    for tick in range(1500):
+    for tick in range(some(600, of=1500)):
         if tick % 50 == 0:  # near, in between, or gone
             far = rng.choice((0.15, 0.3, 0.45))
             points = tip + far * rng.uniform(0.3, 1.0, (rng.integers(0, 3), 3)) * (1.0, 1.0, 0.5)
@@ -64,8 +69,8 @@ def test_accelerations_stay_under_their_share_whatever_danger_does(
 
 
 def test_no_limit_is_passed_when_limits_turn_gentle_at_any_moment() -> None:
-    """1,000 joints, wild commands, gentle and whole limits in turn: position limits are obeyed as with whole ones."""
-    rng, n, dt = np.random.default_rng(1), 1000, 0.004
+    """Many joints, wild commands, gentle and whole limits in turn: position limits are obeyed as with whole ones."""
+    rng, n, dt = np.random.default_rng(1), some(200, of=1000), 0.004
     lower = rng.uniform(-3.0, 0.0, n)
     upper = lower + rng.uniform(0.01, 4.0, n)
     velocity, acceleration = rng.uniform(0.2, 8.0, n), rng.uniform(1.0, 60.0, n)
@@ -86,7 +91,7 @@ def test_no_limit_is_passed_when_limits_turn_gentle_at_any_moment() -> None:
         q = q + qd * dt
         assert (q >= lower - 1e-12).all()
         assert (q <= upper + 1e-12).all()
-    assert exceptions > 100  # joints that had to be braked harder than the share allows
+    assert exceptions > 0.1 * n  # joints that had to be braked harder than the share allows
 
 
 def test_the_whole_share_changes_nothing(run: Any, irb140: Any) -> None:

@@ -56,7 +56,7 @@ def test_without_danger_the_vectors_are_zero(field, wire):
 
 
 @given(BAD, st.integers(0, len(POINTS) - 1), st.integers(0, 2), st.booleans(), st.sampled_from([0.0, 1.0]))
-@settings(deadline=None, max_examples=some(15, of=40))
+@settings(deadline=None, max_examples=some(8, of=40))
 def test_a_point_that_is_not_finite_has_no_finite_danger_and_spoils_no_other(bad, j, axis, in_velocity, kinetic):
     field, points, velocities = DangerField(kinetic=kinetic), POINTS.copy(), 0.1 * POINTS
     expected = *field.evaluate(points, WIRE, velocities), field.vectors(points, WIRE, velocities)
@@ -68,7 +68,7 @@ def test_a_point_that_is_not_finite_has_no_finite_danger_and_spoils_no_other(bad
 
 
 @given(BAD, st.integers(0, 3), st.integers(0, LINKS - 1), st.integers(0, 2), st.booleans(), st.sampled_from([0.0, 1.0]))
-@settings(deadline=None, max_examples=some(26, of=80))
+@settings(deadline=None, max_examples=some(13, of=80))
 def test_a_wire_that_is_not_finite_has_no_finite_danger_anywhere(bad, part, link, axis, no_length, kinetic):
     wire = Wire(*(a.copy() for a in WIRE))
     if no_length:

@@ -19,7 +19,7 @@ CLEARANCE = 0.01  # [m] of the points from the links, where a law is tested rela
 number = st.sampled_from([0.0, 0.5, -1.0]) | st.floats(-2.0, 2.0).map(lambda x: round(x, 6))  # degenerate cases often
 vector = st.tuples(number, number, number).map(np.array)
 unit = vector.filter(lambda x: np.linalg.norm(x) > 0.1).map(lambda x: x / np.linalg.norm(x))
-many = settings(deadline=None, max_examples=some(16, of=50))
+many = settings(deadline=None, max_examples=some(8, of=50))
 
 
 @st.composite

@@ -11,7 +11,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-from amounts import some
+from amounts import first, some, thinned
 
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.link_field import FAR
@@ -133,7 +133,7 @@ DEGENERATE = {  # p, r0, r1, v0, v1
 }
 
 
-@pytest.mark.parametrize("name", DEGENERATE)
+@pytest.mark.parametrize("name", thinned(2, DEGENERATE))
 def test_closed_form_equals_quadrature_in_degenerate_geometry(name):
     agrees(DEGENERATE[name])
 
@@ -171,7 +171,7 @@ def random_geometry(rng: np.random.Generator):
 
 def test_closed_form_equals_quadrature_in_random_geometry():
     rng = np.random.default_rng(1)
-    for _ in range(some(20, of=60)):
+    for _ in range(some(8, of=60)):
         agrees(random_geometry(rng))
 
 
@@ -183,7 +183,9 @@ def test_closed_form_equals_quadrature_in_much_random_geometry(weights):
         agrees(random_geometry(rng), weights)
 
 
-@pytest.mark.parametrize("name", ["0.1 mm off a link of 10 m", "almost opposite velocities", "a hair off the axis"])
+@pytest.mark.parametrize(
+    "name", first(1, ["almost opposite velocities", "0.1 mm off a link of 10 m", "a hair off the axis"])
+)
 def test_the_oracle_has_converged(name):
     value, gradient = oracle(*DEGENERATE[name])
     finer, slope = oracle(*DEGENERATE[name], splits=2)

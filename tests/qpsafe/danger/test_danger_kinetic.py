@@ -48,7 +48,7 @@ turns = st.sampled_from([0.0, 1e-9, 1e-3, 0.5, 1.0, 2.0])
 distances = st.sampled_from([2e-3, 0.05, 0.4, 3.0])
 
 
-@settings(max_examples=some(50, of=150), deadline=None)
+@settings(max_examples=some(25, of=150), deadline=None)
 @given(seeds, lengths, turns, distances)
 def test_eulers_theorem(seed: int, length: float, turn: float, away: float) -> None:
     """H is homogeneous of degree 1 in the velocities: ∂H/∂v·v = H."""
@@ -59,7 +59,7 @@ def test_eulers_theorem(seed: int, length: float, turn: float, away: float) -> N
     assert product == pytest.approx(kinetic(points, wire), rel=1e-8, abs=1e-8 * scale)
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(seeds, st.sampled_from([0.03, 0.3, 1.0]), st.sampled_from([0.0, 1e-3, 0.5, 1.0, 2.0]), distances)
 def test_differences(seed: int, length: float, turn: float, away: float) -> None:
     points, wire = link(seed, length, turn, away)

@@ -1,8 +1,10 @@
 """No link approaches what is seen faster than v_max of its distance: rows against differences, theorems of the tick."""
 
+from functools import cache
+
 import numpy as np
 import pytest
-from amounts import crossed, some
+from amounts import crossed, first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
@@ -26,12 +28,10 @@ LAWS = {
 DT = 0.004
 
 
-def parts_of(robot):
-    capsules = robot_capsules(robot)
+@cache
+def parts_of(name):
+    capsules = robot_capsules(ROBOTS[name])
     return LinkParts(capsules.names, np.repeat(capsules.bodies, 2), capsules.ends, capsules.radii)
-
-
-PARTS = {name: parts_of(robot) for name, robot in ROBOTS.items()}
 
 
 def some_state(robot, rng, share=0.6):
@@ -49,12 +49,12 @@ def controller_with(robot, law=None, figures=None, **parts):
 
 @pytest.mark.parametrize("name", ROBOTS)
 @given(st.integers(0, 10**6))
-@settings(max_examples=20)
+@settings(max_examples=some(8, of=20))
 def test_rows_are_the_rates_at_which_distances_shrink(name, seed):
     robot, rng = ROBOTS[name], np.random.default_rng(seed)
     q, qd = some_state(robot, rng)
     points = rng.uniform(-1.0, 1.0, (3, 3)) + np.array([0.2, 0.0, 0.5])
-    for parts in (PARTS[name], LinkParts.wire(robot)):
+    for parts in (parts_of(name), LinkParts.wire(robot)):
         here, rows = parts.approaches(robot.at(q), points)
         h = 1e-6
         before, after = (parts.approaches(robot.at(q + sign * h * qd), points)[0] for sign in (-1.0, 1.0))
@@ -63,7 +63,7 @@ def test_rows_are_the_rates_at_which_distances_shrink(name, seed):
         assert rows[smooth] @ qd == pytest.approx(-rates[smooth], abs=1e-4)
         assert smooth.mean() > 0.9
         places, jacobians = parts.motion(robot.at(q))
-        if parts is not PARTS[name]:
+        if parts is not parts_of(name):
             for (start, _), place, J in zip(robot.wire_frames, places, jacobians, strict=True):
                 assert place[0] == pytest.approx(robot.pose(start, q)[:3, 3], abs=1e-12)
                 assert J[0] == pytest.approx(robot.jacobian(start, q)[:3], abs=1e-12)
@@ -85,10 +85,10 @@ def test_rows_that_are_left_out_can_be_reached_by_no_command_of_the_tick(seed, a
     q, qd = some_state(ROBOT, rng)
     points = rng.uniform(-0.8, 0.8, (4, 3)) + np.array([0.3, 0.0, 0.4])
     limit, limits = SeparationLimit(Separation(rng.uniform(0.5, 8.0))), JointLimits.of(ROBOT, DT)
-    few = limit.level(ROBOT.at(q), PARTS["irb140"], points, age, qd=qd, limits=limits)
+    few = limit.level(ROBOT.at(q), parts_of("irb140"), points, age, qd=qd, limits=limits)
     kept = np.zeros((0, 2)) if few is None else np.column_stack((few.points, few.gaps))
     box = limits.box(q, qd)
-    distances, A = PARTS["irb140"].approaches(ROBOT.at(q), points)
+    distances, A = parts_of("irb140").approaches(ROBOT.at(q), points)
     upper = limit.separation.speed(distances - 1.6 * age, DT)
     fastest = np.maximum(A * box.lower, A * box.upper).sum(axis=1)
     must = fastest > upper
@@ -113,7 +113,7 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
     """Random states in motion, random points and figures, every law; where not all can be obeyed, no more is broken."""
     robot, rng = ROBOTS[name], np.random.default_rng(sum(map(ord, name + law)))
     tool, obeyed, binding, impossible = robot.tool_frames[0], 0, 0, 0
-    for _ in range(some(12, of=20)):
+    for _ in range(some(8, of=20)):
         figures = Separation(rng.uniform(0.5, 6.0), reaction_time=rng.uniform(0.0, 0.1))
         controller = controller_with(robot, LAWS[law], figures, gate="off", clearance="off")
         q, qd = some_state(robot, rng, share=0.1)
@@ -129,7 +129,7 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
             tick = controller.step(*state, points=points)
             assert tick.box is not None
             limits = JointLimits.of(robot, DT)
-            level = controller.separation.level(robot.at(state[0]), PARTS[name], points, qd=state[1], limits=limits)
+            level = controller.separation.level(robot.at(state[0]), parts_of(name), points, qd=state[1], limits=limits)
             if level is None:
                 continue
             values = level.A @ tick.reference.qd - level.upper
@@ -143,11 +143,11 @@ def test_a_command_obeys_every_row_that_can_be_obeyed_within_the_joint_limits(na
                 broken = [float((np.maximum(level.A @ v - level.upper, 0.0) ** 2).sum()) for v in
                           (tick.reference.qd, again)]  # fmt: skip
                 assert broken[0] <= broken[1] + 1e-9
-    assert obeyed > some(5, of=10)
-    assert binding > 2
+    assert obeyed > some(3, of=10)
+    assert binding > some(0, of=2)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", first(2, LAWS))
 def test_going_towards_a_standing_point_never_breaks_a_row(law):
     """The tool is sent through a point that stands there: at every tick every part keeps S_p of its own approach."""
     robot = ROBOT
@@ -164,7 +164,7 @@ def test_going_towards_a_standing_point_never_breaks_a_row(law):
     for _ in range(300):
         tick = controller.step(q, qd, points=[point])
         q, qd = tick.reference.q, tick.reference.qd
-        distances, A = PARTS["irb140"].approaches(robot.at(q), point[None])
+        distances, A = parts_of("irb140").approaches(robot.at(q), point[None])
         approach = A @ qd
         assert (figures.distance(approach)[approach > 1e-9] <= distances[approach > 1e-9] + 1e-6).all()
         fastest = max(fastest, float(approach.max()))
@@ -191,7 +191,7 @@ def test_a_tick_says_which_link_is_held_apart_from_what():
         for part, number, gap in tick.separation:
             assert number == 1
             assert gap > Separation(3.0).standing - 1e-6
-            assert part in PARTS["irb140"].names
+            assert part in parts_of("irb140").names
             assert f"held apart: {part} and point 1, " in tick.explain()
     assert any(part.startswith("tool") for part in held)
 
@@ -200,11 +200,11 @@ def test_moving_away_is_always_allowed():
     """Inside S_p(0) nothing may come nearer, and the evasion goes on."""
     point = ROBOT.pose("tcp", ROBOT.home)[:3, 3] + [0.1, 0.0, 0.0]
     controller, q, qd = controller_with(ROBOT, figures=Separation(2.0, intrusion=0.5)), ROBOT.home, np.zeros(6)
-    near, _ = PARTS["irb140"].approaches(ROBOT.at(q), point[None])
+    near, _ = parts_of("irb140").approaches(ROBOT.at(q), point[None])
     for _ in range(60):
         tick = controller.step(q, qd, points=[point])
         q, qd = tick.reference.q, tick.reference.qd
-        distances, A = PARTS["irb140"].approaches(ROBOT.at(q), point[None])
+        distances, A = parts_of("irb140").approaches(ROBOT.at(q), point[None])
         assert (A @ qd)[near < 0.4].max() <= 1e-4  # the next tick's rows, nearly
     assert np.linalg.norm(ROBOT.pose("tcp", q)[:3, 3] - point) > 0.102
     assert (distances - near)[near < 0.4].min() > -1e-4
@@ -213,7 +213,7 @@ def test_moving_away_is_always_allowed():
 def test_old_sight_is_no_room():
     """Somebody seen a while ago may have come nearer since; what is stale is the sensor's matter."""
     limit, point = SeparationLimit(Separation(2.0)), ROBOT.pose("tcp", ROBOT.home)[None, :3, 3] + [0.4, 0.0, 0.0]
-    fresh, aged = (limit.level(ROBOT.at(ROBOT.home), PARTS["irb140"], point, age) for age in (0.0, 0.03))
+    fresh, aged = (limit.level(ROBOT.at(ROBOT.home), parts_of("irb140"), point, age) for age in (0.0, 0.03))
     assert (aged.upper <= fresh.upper).all()
     assert aged.upper.min() == pytest.approx(float(limit.separation.speed(fresh.gaps.min() - 1.6 * 0.03)))
     assert oldest(np.array([0.0, 0.02, np.nan, -1.0, 9.0]), 0.04) == 0.02
@@ -236,8 +236,8 @@ def test_robots_without_geometry_are_held_apart_by_their_wire():
 
 
 def test_a_point_on_an_axis_lets_nothing_through_the_numbers():
-    places, _ = PARTS["irb140"].motion(ROBOT.at(ROBOT.home))
-    distances, rows = PARTS["irb140"].approaches(ROBOT.at(ROBOT.home), places.mean(axis=1))
+    places, _ = parts_of("irb140").motion(ROBOT.at(ROBOT.home))
+    distances, rows = parts_of("irb140").approaches(ROBOT.at(ROBOT.home), places.mean(axis=1))
     assert np.isfinite(rows).all()
     assert np.isfinite(distances).all()
     tick = controller_with(ROBOT).step(ROBOT.home, np.zeros(6), points=places.mean(axis=1)[-3:])
@@ -268,7 +268,7 @@ def test_a_batch_keeps_links_apart_as_single_controllers_do():
 
 @pytest.mark.parametrize("name", ROBOTS)
 @given(st.integers(0, 10**6))
-@settings(max_examples=8)
+@settings(max_examples=some(3, of=8))
 def test_however_much_is_seen_a_robot_at_rest_approaches_none_of_it_too_fast(name, seed):
     """With a row for every part and point, a tick took gigabytes."""
     robot, rng = ROBOTS[name], np.random.default_rng(seed)
@@ -283,10 +283,10 @@ def test_however_much_is_seen_a_robot_at_rest_approaches_none_of_it_too_fast(nam
     # so many rows may be ill-conditioned for the law, which says so: they are kept all the same
     assert tick.status == "ok" or tick.messages == ("law: ill-conditioned",)
     level = controller.separation.level(
-        robot.at(robot.home), PARTS[name], points, qd=np.zeros(robot.nq), limits=controller.limits
+        robot.at(robot.home), parts_of(name), points, qd=np.zeros(robot.nq), limits=controller.limits
     )
     assert level is None or len(level.upper) <= MOST
-    distances, A = PARTS[name].approaches(robot.at(robot.home), points)
+    distances, A = parts_of(name).approaches(robot.at(robot.home), points)
     most = controller.separation.separation.speed(distances, controller.dt)
     assert (A @ tick.reference.qd <= most + 1e-8).all()
 
@@ -309,7 +309,7 @@ def test_the_nearest_of_every_part_come_first(seed, most):
 
 
 @given(st.integers(0, 10**6), st.floats(0.0, 0.3))
-@settings(max_examples=20)
+@settings(max_examples=some(8, of=20))
 def test_what_somebody_may_have_come_counts_as_distance(seed, come):
     """However fast people are: errors of places are no times."""
     rng = np.random.default_rng(seed)
@@ -317,16 +317,16 @@ def test_what_somebody_may_have_come_counts_as_distance(seed, come):
     points, age = rng.uniform(-0.5, 0.5, (4, 3)) + np.array([0.3, 0.0, 0.6]), rng.uniform(0.0, 0.2)
     for v_h in (0.0, 0.3, 1.6):
         figures = Separation(2.0, person_speed=v_h)
-        level = SeparationLimit(figures).level(ROBOT.at(q), PARTS["irb140"], points, age, come=come)
+        level = SeparationLimit(figures).level(ROBOT.at(q), parts_of("irb140"), points, age, come=come)
         assert np.allclose(level.upper, figures.speed(level.gaps - max(v_h * age, come)), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-@settings(max_examples=some(10, of=60))
+@settings(max_examples=some(5, of=60))
 @given(st.integers(0, 10**6), st.sampled_from((0.05, 0.3, 2.0, 1e3, 1e7)))
 def test_of_many_points_no_row_that_can_bind_is_left_out(name, seed, spread):
     """Pairs are left out early only where they are far from binding, wherever a cloud is."""
-    robot, parts, rng = ROBOTS[name], PARTS[name], np.random.default_rng(seed)
+    robot, parts, rng = ROBOTS[name], parts_of(name), np.random.default_rng(seed)
     q, qd = some_state(robot, rng, share=rng.choice([0.0, 0.1, 1.0]))
     points = robot.pose(robot.tool_frames[0], q)[:3, 3] + spread * rng.normal(size=(60, 3))
     points[0], points[1] = np.inf, np.nan

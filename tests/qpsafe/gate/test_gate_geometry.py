@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit, types
+from numba import njit
 
 import qpsafe
 from qpsafe.gate.braking_path import braked, covered, ticks_of
@@ -18,9 +18,9 @@ from qpsafe.gate.pack import robot_capsules
 from qpsafe.sensing.body import body_hulls
 
 DT = 0.004
-_covered = njit(types.float64(*[types.float64] * 4))(lambda v, a, dt, t: covered(v, a, dt, t))
-_braked = njit(types.float64(*[types.float64] * 4))(lambda v, a, dt, k: braked(v, a, dt, k))
-_ticks = njit(types.int64(*[types.float64] * 3))(lambda v, a, dt: ticks_of(v, a, dt))
+_covered = njit(lambda v, a, dt, t: covered(v, a, dt, t))
+_braked = njit(lambda v, a, dt, k: braked(v, a, dt, k))
+_ticks = njit(lambda v, a, dt: ticks_of(v, a, dt))
 
 speeds = st.one_of(st.floats(-7.0, 7.0), st.integers(-40, 40).map(float))
 

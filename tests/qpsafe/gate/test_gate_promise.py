@@ -24,20 +24,20 @@ def test_nobody_who_could_be_touched_is_approached_and_nothing_is_touched(name: 
     robot = qpsafe.load_robot(name)
     held = 0
     for seed in (2, 1, 0)[: some(1, of=3)]:
-        told = plays.play(robot, seed, 1_000, look=2, rules=STRICTEST)
+        told = plays.play(robot, seed, some(600, of=1_000), look=2, rules=STRICTEST)
         assert told.approach <= VerifiedMotion().approach + 1e-6
         assert told.short == 0
         assert told.kept_clear(VerifiedMotion().margin)
         assert told.excess <= 1e-12
         held += told.held
-    assert held > 100  # the plays ask for what is not let through
+    assert held > some(50, of=100)  # the plays ask for what is not let through
 
 
 @pytest.mark.parametrize("broken", ["fast", "appear"])
 def test_where_people_do_what_was_not_reckoned_with_it_is_told(broken: str, plays: Any) -> None:
     robot = qpsafe.load_robot("irb140")
     shorts, brakes = 0, []
-    for seed in range(some(2, of=4)):
+    for seed in range(some(1, of=4)):
         told = plays.play(
             robot,
             seed,

@@ -58,7 +58,7 @@ def test_what_is_held_is_what_another_reckoning_holds(name: str, escape: float) 
     robot, rng, held, free = qpsafe.load_robot(name), np.random.default_rng(int(100 * escape)), 0, 0
     rules = VerifiedMotion(escape=escape)
     gate = Gate(robot, rules, JointLimits.of(robot, DT))
-    for _ in range(some(40, of=150)):
+    for _ in range(some(15, of=150)):
         q, qd = drawn(robot, rng)
         points = beside(robot, q, rng, int(rng.integers(1, 6)))
         leads = rng.uniform(0.0, 0.1, len(points))
@@ -67,7 +67,7 @@ def test_what_is_held_is_what_another_reckoning_holds(name: str, escape: float) 
         np.testing.assert_allclose(np.full(robot.nq, np.inf) if most is None else most, expected, rtol=1e-9, atol=1e-9)
         held, free = held + int(np.isfinite(expected).sum()), free + int(np.isinf(expected).sum())
     assert free > 0
-    assert held > 20
+    assert held > some(5, of=20)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -151,7 +151,7 @@ def test_a_hand_at_the_turntable_finds_it_at_rest_and_the_tick_says_so() -> None
     assert any(words.startswith("joint_1") for words in said[0.2])
 
 
-@pytest.mark.parametrize("seed", first(2, range(4)))
+@pytest.mark.parametrize("seed", first(1, range(4)))
 def test_a_batch_holds_the_same_joints_bit_by_bit(seed: int) -> None:
     robot, rng, held = qpsafe.load_robot("irb140"), np.random.default_rng(seed), 0
 
@@ -215,7 +215,7 @@ def test_gentle_limits_of_the_way_back_give_way(irb140: Robot) -> None:
     """On its way back a robot accelerates by a share of what it can; joints that are to stand brake by all of it."""
     here = irb140.pose("tcp", irb140.home)
     held, harder, a = 0, 0, irb140.max_acceleration * DT
-    for seed in range(8):
+    for seed in range(some(4, of=8)):
         rng, back = np.random.default_rng(seed), 0
         controller = qpsafe.SafetyController(irb140, [qpsafe.PositionTask("tcp", qpsafe.FixedPose(here))])
         q, qd, moment = irb140.home, np.zeros(6), int(rng.integers(10, 120))
@@ -232,5 +232,5 @@ def test_gentle_limits_of_the_way_back_give_way(irb140: Robot) -> None:
                 held += 1
                 harder += bool((np.abs(tick.reference.qd - qd) > 0.9 * a).any())
             q, qd, back = tick.reference.q, tick.reference.qd, back + (tick.phase == "recovering")
-    assert held > 20
-    assert harder > 10  # than the way back is allowed to
+    assert held > some(10, of=20)
+    assert harder > some(5, of=10)  # than the way back is allowed to

@@ -24,7 +24,7 @@ def solve(hierarchy, **options):
 @pytest.mark.parametrize("kind", family.KINDS)
 def test_equals_the_exact_solution(kind):
     rng = np.random.default_rng(family.KINDS.index(kind))
-    for _ in range(some(10, of=30)):
+    for _ in range(some(5, of=30)):
         hierarchy = family.one(rng, kind, int(rng.integers(1, 10)))
         solution = solve(hierarchy)
         expected = exact.solve_exactly(triples(hierarchy), hierarchy.lower, hierarchy.upper, solution.qd)

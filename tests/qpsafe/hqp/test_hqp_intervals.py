@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from qpsafe.hqp.level import Level
 from qpsafe.hqp.solve import solve_hierarchy
 
-examples = settings(max_examples=some(20, of=60), deadline=None)
+examples = settings(max_examples=some(10, of=60), deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 
 #: Seeds of the family whose rows are crossed whole, then left at a vertex: found by search, one in 5,000 is like them.
@@ -48,7 +48,7 @@ def test_rows_crossed_whole_count_on_at_their_other_bound(seed):
 
 
 def test_equals_the_exact_solution():
-    count = some(200, of=600)
+    count = some(80, of=600)
     assert family.judge(count, seed=2026)["own"] == {"right": count}
 
 
@@ -75,7 +75,7 @@ def scaled(problem, factors):
 
 def test_units_of_levels_far_apart_are_solved_all_the_same():
     rng = np.random.default_rng(1)
-    for problem in family.family(150, seed=3):
+    for problem in family.family(some(60, of=150), seed=3):
         factors = [np.full(p.rows, 2.0 ** rng.integers(-40, 41)) for p in problem.levels]
         assert judged(scaled(problem, factors)) == "right"
 
@@ -84,7 +84,7 @@ def test_units_of_levels_far_apart_are_solved_all_the_same():
 def test_rows_of_a_level_far_apart_are_solved_or_reported(bits):
     rng = np.random.default_rng(2)
     verdicts = []
-    for problem in family.family(150, seed=4):
+    for problem in family.family(some(80, of=150), seed=4):
         factors = [2.0 ** rng.integers(-bits, bits + 1, p.rows) for p in problem.levels]
         verdicts.append(judged(scaled(problem, factors)))
     assert set(verdicts) <= {

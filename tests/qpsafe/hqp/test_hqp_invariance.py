@@ -13,7 +13,7 @@ from qpsafe.hqp.solution import MEANING
 from qpsafe.hqp.solve import solve_hierarchy
 
 seeds = st.integers(0, 2**32 - 1)
-examples = settings(max_examples=some(20, of=60), deadline=None)
+examples = settings(max_examples=some(10, of=60), deadline=None)
 
 
 def problem(seed):
@@ -182,7 +182,7 @@ def anything(rng, shape):
     return a
 
 
-@settings(max_examples=some(133, of=400), deadline=None)
+@settings(max_examples=some(66, of=400), deadline=None)
 @given(seeds)
 def test_no_data_raise_leave_the_box_or_repeat_differently(seed):
     rng = np.random.default_rng(seed)

@@ -57,7 +57,7 @@ SILENCES = st.sampled_from([0.0, 0.001, 0.01, 0.03]) | st.floats(0.0, 0.1)
 BACKLOGS = st.sampled_from([1, 2, 10, FAR_TOO_MANY])
 
 
-@settings(max_examples=some(30, of=200), deadline=None)
+@settings(max_examples=some(15, of=200), deadline=None)
 @given(
     st.lists(st.tuples(BACKLOGS, SILENCES, st.sampled_from([None, 0.0, 0.05]), st.booleans()), min_size=1, max_size=6)
 )
@@ -134,7 +134,7 @@ class Clocks:
 STEPS, TIMES = st.integers(-(10**11), 10**11), st.integers(0, 10**10)
 
 
-@settings(max_examples=some(200, of=2000))
+@settings(max_examples=some(100, of=2000))
 @given(st.lists(st.tuples(TIMES, STEPS | st.just(0), TIMES, st.booleans()), max_size=8))
 def test_setting_the_clock_makes_nothing_younger_than_it_is_nor_older_than_the_last_look(
     rounds: list[tuple[int, int, int, bool]],

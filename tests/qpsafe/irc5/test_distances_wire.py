@@ -35,7 +35,7 @@ COUNTS = st.integers(0, 70_000) | st.sampled_from([MOST_SPOTS, MOST_SPOTS + 1, M
 SHAPES = st.tuples(COUNTS) | st.tuples(st.integers(0, 30)) | st.sampled_from([(), (20, 2), (2, 20), (20, 1), (1, 20)])
 
 
-@settings(max_examples=some(60, of=500), deadline=None)
+@settings(max_examples=some(25, of=500), deadline=None)
 @given(SHAPES, st.none() | SHAPES | st.just("the same"))
 def test_what_can_be_sent_can_be_read_and_all_else_is_refused_by_name(shape: Any, aged: Any) -> None:
     aged = shape if aged == "the same" else aged
@@ -57,7 +57,7 @@ def test_what_can_be_sent_can_be_read_and_all_else_is_refused_by_name(shape: Any
         writer.close()
 
 
-@settings(max_examples=some(100, of=300))
+@settings(max_examples=some(50, of=300))
 @given(st.binary(max_size=400), st.integers(0, 300), st.integers(1, 255))
 def test_junk_is_nothing(junk: bytes, at: int, flip: int) -> None:
     assert decode(junk, 20) is None or junk[:4] == b"QPSD"
@@ -136,7 +136,7 @@ def test_an_address_in_use_is_named(wire) -> None:
         SensorInput(3, port=wire[0].address[1])
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(
     st.lists(st.floats(-1e6, 1e6) | st.floats(-0.1, 0.1) | st.just(float("nan")), min_size=3, max_size=3),
     st.floats(0.06, 30.0),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import first, some
 
 import qpsafe
 from qpsafe.irc5.messages import MAX_SIZE, MCI_STATES, RAPID_STATES, RobotPacket, decode_sensor, encode_robot
@@ -20,7 +20,7 @@ from qpsafe.limits import JointLimits
 
 SCRIPT = Path(__file__).with_name("egm_peer.py")
 PEERS = ("ABBRobotEGM", "abb-robot-client")
-EXCHANGES = some(1500, of=5000)
+EXCHANGES = some(500, of=5000)
 N = 6
 
 
@@ -29,7 +29,7 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", first(1, PEERS))
 def test_a_peer_as_the_pc_reads_our_robot_and_we_read_its_answers(peer: str) -> None:
     process = start(peer, "pc", EXCHANGES)
     random = np.random.default_rng(EXCHANGES)
@@ -60,7 +60,7 @@ def test_a_peer_as_the_pc_reads_our_robot_and_we_read_its_answers(peer: str) -> 
     assert process.returncode == 0, errors
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", first(1, PEERS))
 def test_a_robot_that_speaks_with_a_peers_messages_is_driven(peer: str) -> None:
     """It goes where it is sent, so that what we read is what we sent before, through both codes."""
     robot = qpsafe.load_robot("irb140")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import thinned
 from egm_wire import A_MAX, DT, LIMITS, PEER, V_MAX, N, Wire
 
 from qpsafe.errors import ConfigurationError
@@ -28,7 +29,7 @@ JUNK = {
 }
 
 
-@pytest.mark.parametrize("reason", JUNK)
+@pytest.mark.parametrize("reason", thinned(2, JUNK))
 def test_junk_is_refused_counted_and_changes_nothing(wire: Wire, reason: str) -> None:
     for _ in range(2):  # before the robot is known, and later
         wire.pass_time()

@@ -27,7 +27,7 @@ ORDERS = st.tuples(
 )
 
 
-@settings(max_examples=some(50, of=150))
+@settings(max_examples=some(25, of=150))
 @given(seed=st.floats(-1.3, 1.3), orders=st.lists(ORDERS, max_size=12))
 def test_no_step_leaves_the_limits_whatever_is_asked(seed: float, orders: list) -> None:
     made = shaper(seed)

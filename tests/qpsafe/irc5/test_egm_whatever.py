@@ -31,7 +31,7 @@ EVENTS = st.sampled_from(
 )
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(events=st.lists(st.tuples(EVENTS, st.integers(1, 60)), max_size=40), data=st.data())
 def test_whatever_happens_answers_are_finite_unique_and_never_jump(events: list, data: st.DataObject) -> None:
     wire = Wire(EgmSession(LIMITS, SessionRules(ramp_in=0.05, ramp_out=0.02)))

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -48,7 +49,7 @@ def until(condition: Callable[[], bool]) -> bool:
 
 
 @given(st.lists(st.text(max_size=40) | st.binary(max_size=40), max_size=30), st.integers(1, 50))
-@settings(max_examples=25)
+@settings(max_examples=some(10, of=25))
 def test_everything_is_written_in_order_however_little_is_taken_at_a_time(pieces: list, most: int) -> None:
     gate = Gate(most)
     gate.open.set()

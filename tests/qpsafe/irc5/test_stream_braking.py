@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import crossed, some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -142,7 +142,7 @@ def raising(number: int) -> Callable[[], None]:
 
 
 @given(st.lists(st.tuples(st.sampled_from(LEAVE), st.integers(0, 110)), min_size=1, max_size=8), st.integers(130, 300))
-@settings(max_examples=some(6, of=15))
+@settings(max_examples=some(3, of=15))
 def test_signals_in_any_order_and_repeated_brake_first(signals: list[tuple[int, int]], start: int) -> None:
     deeds: dict[int, list] = {}
     for number, later in signals:
@@ -194,7 +194,7 @@ def test_before_a_robot_is_driven_the_second_request_ends_the_program(number: in
 
 
 @given(st.integers(130, 300), st.sampled_from(["watchdog: killed", "log: full", "standard error: blocked"]))
-@settings(max_examples=6)
+@settings(max_examples=some(2, of=6))
 def test_a_helper_in_trouble_ends_the_stream_within_a_tenth_of_a_second(cycle: int, words: str) -> None:
     stage = Stage({})
     bad = cycle * 0.004
@@ -209,8 +209,13 @@ def test_a_helper_in_trouble_ends_the_stream_within_a_tenth_of_a_second(cycle: i
     assert not run.good
 
 
-@pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt, MemoryError, ValueError, OSError, RecursionError])
-@pytest.mark.parametrize("where", ["on_tick", "on_events", "on_second", "helper"])
+@pytest.mark.parametrize(
+    ("error", "where"),
+    crossed(
+        [SystemExit, KeyboardInterrupt, MemoryError, ValueError, OSError, RecursionError],
+        ["on_tick", "on_events", "on_second", "helper"],
+    ),
+)
 def test_whatever_raises_in_the_loop_the_robot_is_braked(error: type[BaseException], where: str) -> None:
     stage = Stage({})
 
@@ -256,7 +261,7 @@ def test_a_stream_that_is_to_end_does_not_wait_long_for_a_robot_that_has_gone(si
 
 
 @given(st.floats(0.05, 5.0), st.integers(1, 300))
-@settings(max_examples=some(6, of=60))
+@settings(max_examples=some(3, of=60))
 def test_a_robot_is_held_if_and_only_if_it_was_silent_for_longer_than_is_borne(silence: float, passes: int) -> None:
     """Within it the stream goes on as if nothing had been; also where a session by itself would see a new start."""
     assume(abs(0.02 * passes - silence) > 0.03)

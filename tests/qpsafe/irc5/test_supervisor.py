@@ -116,7 +116,7 @@ class Stream(RuleBasedStateMachine):
 
 
 TestStream = Stream.TestCase
-TestStream.settings = settings(max_examples=some(40, of=120), stateful_step_count=30, deadline=None)
+TestStream.settings = settings(max_examples=some(20, of=120), stateful_step_count=30, deadline=None)
 
 
 def test_no_event_but_acknowledgement_leads_back() -> None:
@@ -156,7 +156,7 @@ def test_the_log_is_bounded_and_a_repeated_cause_is_logged_once() -> None:
     st.lists(st.floats(0.0, 1e6, allow_subnormal=False), min_size=2, max_size=60),
     st.sampled_from(["joint_2 is {} rad from what it was sent", "law: <object at 0x{:x}> failed after {:.3f} s"]),
 )
-@settings(max_examples=some(16, of=50), deadline=None)
+@settings(max_examples=some(8, of=50), deadline=None)
 def test_a_cause_whose_figures_change_is_one_cause_and_one_line(figures: list[float], words: str) -> None:
     supervisor = Supervisor()
     supervisor.seed("ready")

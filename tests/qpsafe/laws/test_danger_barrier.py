@@ -22,7 +22,7 @@ def scene(seed: int) -> tuple:
     return ROBOT.at(q), rng.normal(size=6), points
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds)
 def test_static_gradient_is_the_derivative_of_the_field(seed: int) -> None:
     state, _, points = scene(seed)
@@ -34,7 +34,7 @@ def test_static_gradient_is_the_derivative_of_the_field(seed: int) -> None:
         assert gradient[:, j] == pytest.approx(difference, rel=1e-5, abs=1e-5 * np.abs(gradient).max())
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds)
 def test_kinetic_gradient_obeys_eulers_theorem(seed: int) -> None:
     """H is homogeneous of degree 1: ∂H/∂q̇ q̇ = H."""
@@ -43,7 +43,7 @@ def test_kinetic_gradient_obeys_eulers_theorem(seed: int) -> None:
     assert DangerBarrier(10.0).kinetic_gradient(state, qd, points) @ qd == pytest.approx(H, rel=1e-12)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds, st.floats(0.0, 0.99e-3))
 def test_at_rest_no_direction_of_motion_counts(seed: int, speed: float) -> None:
     """H has a kink at rest: a direction that rounding has chosen must not decide where the robot goes."""
@@ -51,7 +51,7 @@ def test_at_rest_no_direction_of_motion_counts(seed: int, speed: float) -> None:
     assert not DangerBarrier(10.0).kinetic_gradient(state, speed * qd / np.abs(qd).max(), points).any()
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(seeds, st.floats(3.0, 30.0), st.floats(0.1, 5.0))
 def test_scaling_caps_the_field_exactly(seed: int, delta_max: float, speed: float) -> None:
     state, qd, points = scene(seed)
@@ -68,7 +68,7 @@ def test_scaling_caps_the_field_exactly(seed: int, delta_max: float, speed: floa
         assert capped[room].max() == pytest.approx(delta_max, rel=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds)
 def test_soft_level_predicts_the_field_along_the_present_motion(seed: int) -> None:
     """With τ = 0 and q̇ the present velocity, a row's value is CDF itself."""

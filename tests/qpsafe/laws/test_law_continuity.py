@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, some
 
 import qpsafe
 from qpsafe.laws.problem import LawProblem, TaskVelocity
@@ -20,11 +20,11 @@ LAWS = {
 
 @pytest.mark.parametrize("name", LAWS)
 def test_velocity_steps_stay_within_the_acceleration_limit(name: str) -> None:
-    """Random jumps of activations, task order, targets, evasive velocity and soft levels over 1,500 ticks."""
+    """Random jumps of activations, task order, targets, evasive velocity and soft levels at once, again and again."""
     law, rng = LAWS[name], np.random.default_rng(3)
     limits = JointLimits(ROBOT.lower, ROBOT.upper, ROBOT.max_velocity, ROBOT.max_acceleration, DT)
     q, qd = ROBOT.home.copy(), np.zeros(6)
-    for tick in range(1500):
+    for tick in range(some(600, of=1500)):
         if tick % 37 == 0:  # everything jumps at once
             activations = tuple(np.cumprod(rng.choice((0.0, 0.3, 1.0), 2)))
             swapped, qd0 = rng.random() < 0.5, rng.normal(size=6) * rng.choice((0.1, 2.0, 50.0))
@@ -47,7 +47,7 @@ def test_damping_keeps_speeds_bounded_and_continuous_through_a_singular_pose(cro
 
     def sweep(law: qpsafe.HierarchicalLaw) -> np.ndarray:
         result = []
-        for s in np.linspace(-0.05, 0.05, 4001):
+        for s in np.linspace(-0.05, 0.05, some(2001, of=4001)):
             q = ROBOT.home + 0.1
             q[4 if crossing == "wrist" else 2] = s if crossing == "wrist" else -np.pi / 2 + s
             J = ROBOT.jacobian("tcp", q)

@@ -120,7 +120,7 @@ def compare(robot: Any, one: Resolved, other: Other) -> None:
         np.testing.assert_allclose(a.residuals, b.residuals, rtol=0.0, atol=1e-9)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=some(5, of=12), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.01, 1.0]))
 def test_one_call_is_the_parts_asked_one_by_one(irb140: Any, seed: int, spread: float) -> None:
     for tasks, law, limits in kinds(irb140).values():
@@ -134,7 +134,7 @@ def test_one_call_is_the_parts_asked_one_by_one(irb140: Any, seed: int, spread: 
         compare(irb140, one, one_by_one(state, qd, tasks, samples, qd0, activations, law, limits))
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(
     st.integers(0, 2**32 - 1), st.sampled_from([0.01, 1.0]), st.sampled_from([0, 1, 2]), st.sampled_from([0.0, 0.02])
 )

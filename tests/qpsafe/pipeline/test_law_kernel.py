@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from amounts import first, some
 
 import qpsafe
 from qpsafe.danger.activation import regime_weights as weights_of
@@ -131,7 +132,7 @@ def test_null_space_law_is_the_blend_by_pseudoinverses_and_is_clipped() -> None:
 def test_paper_law_is_the_hierarchy_below_its_first_task(bound: float | None) -> None:
     """[J_1 q̇ = ẋ_1 ≻ q̇ = what the paper adds], its second level by pseudoinverses, in limits; regime by regime."""
     bound_somewhere = 0
-    for p in problems(120, 3, bound):
+    for p in problems(some(60, of=120), 3, bound):
         n, law = len(p.qd0), LAWS[PAPER]
         expected = np.zeros(n)
         for kept, weight in enumerate(weights_of(p.activations)):
@@ -143,7 +144,7 @@ def test_paper_law_is_the_hierarchy_below_its_first_task(bound: float | None) ->
         assert answer.blend.tobytes() == asked.qd.tobytes()
         assert same(answer.result, asked)
         bound_somewhere += p.upper is not None and np.isclose(np.abs(expected), p.upper).any()
-    assert (bound == 0.5) == (bound_somewhere > 30)
+    assert (bound == 0.5) == (bound_somewhere > some(15, of=30))
 
 
 @pytest.mark.parametrize("bound", [None, 0.5])
@@ -209,7 +210,7 @@ def derived(law: Any) -> Any:
     return made
 
 
-@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("kind", first(2, LAWS))
 def test_a_controller_does_the_same_as_with_the_law_asked_in_python(kind: int, irb140: Any) -> None:
     """Somebody walks up and off again: all regimes, commands to the bit, and what is told about them."""
     law = LAWS[kind]

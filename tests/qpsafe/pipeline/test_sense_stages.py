@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -59,7 +60,7 @@ def compare(one: Any, other: Any) -> None:
 
 
 @pytest.mark.parametrize("ours", [True, False])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([0.0, 0.02, 0.3]), st.booleans())
 def test_readings(irb140: Any, ours: bool, seed: int, velocities: bool, sick: float, aged: bool) -> None:
     rng, spots = np.random.default_rng(seed), qpsafe.load_spots(irb140)
@@ -95,7 +96,7 @@ def test_readings(irb140: Any, ours: bool, seed: int, velocities: bool, sick: fl
 
 
 @pytest.mark.parametrize("ours", [True, False])
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["", "NaN", "far", "strided", "read-only", "list", "float32"]))
 def test_points(irb140: Any, ours: bool, seed: int, what: str) -> None:
     rng = np.random.default_rng(seed)

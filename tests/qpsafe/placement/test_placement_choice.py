@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from amounts import first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
@@ -48,7 +49,7 @@ def literal_cost(sample: Sample, chosen: tuple[int, ...]) -> float:
     return sum(float((sample.peak - y[i] * Q[:, i]).sum()) for i in range(sample.nodes))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", first(1, range(3)))
 def test_10_agrees_with_brute_force(seed: int) -> None:
     sample = sample_of(seed)
     order = cheapest_order(sample)
@@ -79,7 +80,7 @@ def test_13_agrees_with_brute_force(seed: int, share: float) -> None:
     assert enough(tuple(quick.chosen))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", first(1, range(3)))
 @pytest.mark.parametrize("kind", ["detection", "danger", "torque"])
 @pytest.mark.parametrize("capped", [False, True])
 def test_best_choice_agrees_with_brute_force(seed: int, kind: str, capped: bool) -> None:
@@ -111,7 +112,7 @@ def test_best_choice_agrees_with_brute_force(seed: int, kind: str, capped: bool)
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 def test_curves_are_monotone_and_end_where_all_nodes_do(seed: int) -> None:
     sample = sample_of(seed, nodes=9, pairs=24)
     Q = table(sample)

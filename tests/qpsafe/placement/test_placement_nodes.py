@@ -26,7 +26,7 @@ ROBOT = qpsafe.load_robot("irb140")
 
 @pytest.fixture(scope="module")
 def nodes() -> Candidates:
-    return candidate_nodes(ROBOT, spacing=some(7, of=4) / 100)
+    return candidate_nodes(ROBOT, spacing=some(9, of=4) / 100)
 
 
 @pytest.mark.slow
@@ -35,7 +35,7 @@ def test_the_irb140_has_as_many_nodes_as_the_source() -> None:
 
 
 def test_nodes_have_names_of_their_own_and_fit_the_robot(nodes: Candidates) -> None:
-    assert len(set(nodes.nodes.names)) == len(nodes) > some(50, of=150)
+    assert len(set(nodes.nodes.names)) == len(nodes) > some(25, of=150)
     nodes.nodes.check(ROBOT)
 
 
@@ -115,6 +115,7 @@ def test_self_sight_is_that_of_every_ray_cast_in_every_pose() -> None:
         assert 0 < expected.sum() < len(points)
 
 
+@pytest.mark.slow
 def test_gaps_are_filled_as_if_every_fine_point_had_been_tried() -> None:
     """And as well at the next spacing, when some of them are known."""
     region = next(region for region in ROBOT.regions if region.name == "wrist")
@@ -133,6 +134,7 @@ def test_gaps_are_filled_as_if_every_fine_point_had_been_tried() -> None:
     assert filled > 0
 
 
+@pytest.mark.slow
 def test_the_bundled_spots_do_not_see_the_robot_from_close_by() -> None:
     spots, sight = qpsafe.load_spots(ROBOT), SelfSight(ROBOT, 0.16, 0.8, np.deg2rad(6.0))
     assert spots is not None
@@ -177,7 +179,7 @@ def test_a_placement_written_is_what_the_controller_loads(nodes: Candidates, tmp
 
 @pytest.fixture(scope="module")
 def arrays() -> Candidates:
-    return candidate_nodes(ROBOT, spacing=some(20, of=12) / 100, sensor=SENSORS[SensorName.vl53l5cx])
+    return candidate_nodes(ROBOT, spacing=some(28, of=12) / 100, sensor=SENSORS[SensorName.vl53l5cx])
 
 
 def test_arrays_written_are_what_is_loaded_zone_by_zone(arrays: Candidates, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import mink
 import mujoco
 import numpy as np
 import pytest
+from amounts import first, some
 from ik_engines import DT, Mink, Pink, near, watch
 
 import qpsafe
@@ -66,7 +67,7 @@ def test_within_the_joint_limits_no_call_fails_whatever_the_danger(engine, robot
     danger, q, qd = DangerMonitor(robot, DT), np.array(robot.home), np.zeros(6)
     limits = [engine.plugin.JointLimit(danger), engine.plugin.DangerLimit(danger, delta_max=8.0)]
     evasive, configuration, point = engine.plugin.EvasiveTask(danger), engine.at(q), np.ones(3)
-    for k in range(400):
+    for k in range(some(200, of=400)):
         if k % 40 == 0:
             hold = engine.frame(robot.pose("tcp", rng.uniform(robot.lower, robot.upper)), 1.0, 0.3, gain=0.2)
             point = near(robot, q, rng.uniform(0.0, 0.8))
@@ -81,7 +82,7 @@ def test_within_the_joint_limits_no_call_fails_whatever_the_danger(engine, robot
     assert np.all(q <= robot.upper + 1e-6)
 
 
-@pytest.mark.parametrize("name", qpsafe.bundled_robots())
+@pytest.mark.parametrize("name", first(1, qpsafe.bundled_robots()))
 def test_every_bundled_robot_makes_way_in_a_loop_of_mink(name):
     robot = qpsafe.load_robot(name)
     model = mujoco.MjModel.from_xml_path(str(robot.model_path))
@@ -127,7 +128,7 @@ def test_bad_data_are_reported_and_brake(engine, robot, bad):
     }[bad]
     hold = engine.frame(robot.pose("tcp", robot.home + 0.1), 1.0, 1.0, gain=0.05)
     limit, evasive = engine.plugin.DangerLimit(danger, 11.0), engine.plugin.EvasiveTask(danger)
-    for _ in range(3000):
+    for _ in range(1500):
         danger.update(*data)
     assert danger.status == "bad_input"
     assert danger.message
@@ -186,7 +187,7 @@ def test_mistakes_are_named(engine, robot):
 
 
 def test_outside_a_joint_limit_solve_ik_raises_and_qpsafe_comes_back(engine, robot):
-    raised, joints = 0, (0, 1, 4)
+    raised, joints = 0, (4, 0, 1)[: some(2, of=3)]
     for joint in joints:
         q = np.array(robot.home)
         q[joint] = robot.upper[joint] + 0.05
@@ -215,7 +216,7 @@ def test_outside_a_joint_limit_solve_ik_raises_and_qpsafe_comes_back(engine, rob
             configuration.update(q)
             speeds.append(qd[joint])
         back_inside(robot, joint, q, speeds)
-    assert raised >= (3 if type(engine) is Mink else 2)
+    assert raised >= len(joints) - (type(engine) is not Mink)
 
 
 def back_inside(robot, joint, q, speeds):

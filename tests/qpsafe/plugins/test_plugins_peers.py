@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from amounts import some
 from ik_engines import DT, TIGHT, Mink, box, near, states, watch
 
 import qpsafe
@@ -20,7 +21,7 @@ from qpsafe.plugins.monitor import DangerMonitor
 
 def test_the_weighted_law_and_solve_ik_agree_on_the_same_tasks_costs_and_limits(engine, robot):
     active = 0
-    for rng, q, target in states(robot, 60):
+    for rng, q, target in states(robot, some(30, of=60)):
         configuration, (lower, upper) = engine.at(q), box(engine, q)
         danger = watch(robot, q, [])
         danger.qd0 = rng.uniform(-0.5, 0.5, 6)
@@ -31,7 +32,7 @@ def test_the_weighted_law_and_solve_ik_agree_on_the_same_tasks_costs_and_limits(
         ours = law.solve(LawProblem(rows, danger.qd0, (1.0, 1.0), lower, upper)).qd
         np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-6)
         active += int(np.any((ours <= lower + 1e-9) | (ours >= upper - 1e-9)))
-    assert active > 10  # limits decided some of them
+    assert active > some(4, of=10)  # limits decided some of them
 
 
 def test_qpsafes_tasks_in_solve_ik_are_the_weighted_law(engine, robot):
@@ -121,7 +122,7 @@ def test_the_evasive_task_moves_the_robot_away(engine, robot):
         configuration.update(q)
     assert np.linalg.norm(robot.pose("tcp", q)[:3, 3] - point) > 0.35
     assert danger.cdf_n < before
-    for _ in range(750):  # it is gone: the tool comes back
+    for _ in range(some(500, of=750)):  # it is gone: the tool comes back
         danger.update(q, qd, [])
         qd = engine.solve(configuration, [hold, evasive], engine.limits())
         q = q + qd * DT

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -49,7 +50,7 @@ def pose_of(rng: np.random.Generator) -> np.ndarray:
     return pose
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=some(12, of=30), deadline=None)
 @given(st.sampled_from(list(SENSORS)), seeds, st.sampled_from([0.0, 0.02, 0.2]))
 def test_the_tree_finds_what_all_zones_one_by_one_find(name: str, seed: int, error: float) -> None:
     rng, sensor = np.random.default_rng(seed), SENSORS[name]
@@ -62,7 +63,7 @@ def test_the_tree_finds_what_all_zones_one_by_one_find(name: str, seed: int, err
     assert told.tolist() == [by_hand(sensor, x, error, d, valid, sigma) for x in inside]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(st.sampled_from(list(SENSORS)), seeds, st.floats(0.0, 0.1), st.floats(0.0, 0.1))
 def test_what_may_be_elsewhere_is_looked_through_less(name: str, seed: int, error: float, more: float) -> None:
     """A larger error, noisier readings, or nearer ones never delete a point that was kept without them."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -59,7 +60,7 @@ def test_images_of_a_long_bad_time_are_left_out_and_that_is_said(run: Any, array
     assert len(tick.points) > 0
 
 
-@settings(max_examples=15)
+@settings(max_examples=some(6, of=15))
 @given(SEEDS)
 def test_images_of_one_tick_may_come_in_any_order(run: Any, eyes: Any, seed: int) -> None:
     """Also those of one sensor, and of sensors that look through what others have lost."""
@@ -104,7 +105,7 @@ KINDS: dict[str, Callable[[float], Any]] = {
 }
 
 
-@settings(max_examples=10)
+@settings(max_examples=some(4, of=10))
 @given(SEEDS, st.sampled_from(sorted(KINDS)), st.sampled_from([0.0, 1e3, -1e3, 2.0**30, 1.7e9]))
 def test_only_differences_of_times_count(run: Any, eyes: Any, seed: int, kind: str, start: float) -> None:
     rng, make = np.random.default_rng(seed), KINDS[kind]
@@ -134,7 +135,7 @@ def test_what_is_no_time_is_told_and_the_next_one_counts(run: Any, array: RangeS
         assert len(loop.feed(loop.q, loop.qd, images=[], now=0.012).points) > 0
 
 
-@settings(max_examples=25)
+@settings(max_examples=some(10, of=25))
 @given(SEEDS, st.sampled_from([1e-4, 0.001, 0.004, 0.1]), st.floats(0.05, 3.0))
 def test_a_configuration_is_known_for_as_long_as_images_may_be_old(seed: int, dt: float, span: float) -> None:
     """However short ticks are."""

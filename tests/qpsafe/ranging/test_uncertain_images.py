@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import crossed
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -105,8 +106,7 @@ def test_sigma_is_asked_of_what_reads_something_only(run: Any, eyes: Any) -> Non
     assert any("sigma" in message for message in wrong.messages)
 
 
-@pytest.mark.parametrize("rows", [8, 120])
-@pytest.mark.parametrize("sigma", [0.5, 20.0, 1e6])
+@pytest.mark.parametrize(("rows", "sigma"), crossed([8, 120], [20.0, 0.5, 1e6]))
 def test_a_sigma_that_hides_everything_near_the_robot_is_told(run: Any, eyes: Any, rows: int, sigma: float) -> None:
     """All would be taken for the robot itself: nothing was said, and nobody was seen."""
     sensor = camera(eyes, rows)

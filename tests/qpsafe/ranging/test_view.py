@@ -34,7 +34,7 @@ def reducer(sensor: RangeSensor, robot: Any, things: list[Obstacle]) -> Reducer:
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-@settings(max_examples=some(15, of=40))
+@settings(max_examples=some(8, of=40))
 @given(st.integers(0, 2**32 - 1))
 def test_an_image_shows_the_same_whether_things_out_of_view_are_asked_or_not(irb140: Any, kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)

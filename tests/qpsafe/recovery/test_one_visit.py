@@ -42,7 +42,7 @@ def update(path: Recovery, danger: float, x: float = 0.0) -> tuple[Sample, ...]:
     calm=st.floats(0.1, 1.0),
     dwell=st.floats(0.0, 0.5),
 )
-@settings(deadline=None, max_examples=some(33, of=100))
+@settings(deadline=None, max_examples=some(16, of=100))
 def test_between_two_suspensions_danger_was_small_for_the_dwell(dangers: list, calm: float, dwell: float) -> None:
     """Whatever danger does: a suspension ends only after it was at or below calm Δ(1-ε) for longer than the dwell."""
     path, quiet, before = recovery(RecoveryRules(calm=calm, dwell=dwell)), 0.0, FOLLOWING

@@ -112,7 +112,7 @@ def judge(cases: Iterator[tuple[Any, str, np.ndarray, np.ndarray]], law: Any = N
 def test_arms_with_three_parallel_axes_rest_or_say_why_not(three_parallel_axes: Any) -> None:
     rng = np.random.default_rng(3)
     arms = [three_parallel_axes(rng) for _ in range(some(1, of=4))]
-    there, said = judge((arm, "tip", *case) for arm in arms for case in parallel_goals(rng, 4))
+    there, said = judge((arm, "tip", *case) for arm in arms for case in parallel_goals(rng, some(1, of=4)))
     assert there >= 0.9 * (there + said)
 
 
@@ -132,7 +132,7 @@ def test_hundreds_of_goals_on_every_bundled_robot(name: str) -> None:
     judge((robot, frame_of(robot), *case) for case in bundled_goals(rng, robot, 250))
 
 
-@pytest.mark.parametrize("name", first(2, bundled_robots()))
+@pytest.mark.parametrize("name", first(1, bundled_robots()))
 def test_bundled_robots_rest_or_say_why_not(name: str) -> None:
     robot, rng = qpsafe.load_robot(name), np.random.default_rng(4)
     judge((robot, frame_of(robot), *case) for case in bundled_goals(rng, robot, 2))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, some
 
 import qpsafe
 from qpsafe.tasks.moves import Line, Rates
@@ -22,6 +22,10 @@ PAPER: Any = {"evasion": "paper", "recovery": qpsafe.RecoveryRules.paper()}
 
 def tasks_on(trajectory: Any) -> list[Any]:
     return [qpsafe.PositionTask("tcp", trajectory), qpsafe.OrientationTask("tcp", trajectory)]
+
+
+def home(tick: Any) -> bool:
+    return bool(tick.phase == "following" and max(np.linalg.norm(e) for e in tick.errors) < 5e-4)
 
 
 def after_a_hand(run: Any, robot: Any, seed: int, hand: float = 60.0) -> Any:
@@ -81,10 +85,7 @@ def test_danger_on_the_way_through_the_joints_suspends_it(run: Any, irb140: Any)
     tick = loop.step(here + BESIDE)
     assert tick.phase == "suspended"
     assert loop.controller.recovery.way is None
-    for _ in range(4000):
-        tick = loop.step(NOTHING)
-    assert tick.phase == "following"
-    assert max(np.linalg.norm(e) for e in tick.errors) < 5e-4
+    assert any(home(loop.step(NOTHING)) for _ in range(4000))
 
 
 def test_the_way_through_the_joints_ends_at_its_posture_and_then_on_the_path(run: Any, irb140: Any) -> None:
@@ -100,9 +101,10 @@ def test_the_way_through_the_joints_ends_at_its_posture_and_then_on_the_path(run
         reached |= float(np.abs(loop.q - goal).max()) < 1e-3
         if recovery.way is not None:
             assert np.abs(loop.qd).max() < 1.1 * loop.controller.recovery_rules.joint_speed
+        if reached and home(tick):
+            break
     assert reached
-    assert tick.phase == "following"
-    assert max(np.linalg.norm(e) for e in tick.errors) < 5e-4
+    assert home(tick)
 
 
 @pytest.mark.parametrize("seed", first(1, range(4)))
@@ -113,7 +115,7 @@ def test_goals_out_of_reach_are_named_and_the_robot_stands(run: Any, irb140: Any
     goal = irb140.pose("tcp", rng.uniform(irb140.lower, irb140.upper))
     goal[:3, 3] = np.array([0.0, 0.0, 0.35]) + way / np.linalg.norm(way) * rng.choice([1.2, 2.0, 5.0])
     loop = run(tasks=tasks_on(qpsafe.FixedPose(goal)))
-    for _ in range(5000):
+    for _ in range(some(3000, of=5000)):
         tick = loop.step(NOTHING)
     assert tick.status == "degraded"
     assert "position by" in tick.messages[0]

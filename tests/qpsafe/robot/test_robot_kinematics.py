@@ -16,7 +16,7 @@ ROBOT = load_robot("irb140")
 STEP = 1e-6
 unit = hnp.arrays(float, 6, elements=st.floats(0.0, 1.0))
 speeds = hnp.arrays(float, 6, elements=st.floats(-4.0, 4.0))
-quick = settings(max_examples=some(15, of=40), deadline=None)
+quick = settings(max_examples=some(8, of=40), deadline=None)
 
 
 def inside(fraction: np.ndarray) -> np.ndarray:

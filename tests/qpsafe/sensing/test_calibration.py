@@ -26,7 +26,7 @@ def test_distance_is_the_inverse_of_voltage(curve: SharpCurve, d: float) -> None
     assert curve.voltage(d + 0.01) < curve.voltage(d)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=some(12, of=30), deadline=None)
 @given(curves)
 def test_exact_pairs_give_the_curve_back(curve: SharpCurve) -> None:
     d = np.linspace(0.2, 0.8, 13)
@@ -66,7 +66,7 @@ def test_wrong_pairs_do_not_spoil_the_curve() -> None:
     assert np.sort(np.abs(spoilt.errors))[-3:].min() > 0.02  # the residuals show them
 
 
-@settings(max_examples=20)
+@settings(max_examples=some(8, of=20))
 @given(st.integers(10, 40), st.integers(0, 2**32 - 1), st.floats(0.3, 1.5), st.data())
 def test_wrong_pairs_are_found_and_forgiven_up_to_a_tenth(n: int, seed: int, off: float, data: st.DataObject) -> None:
     """Exactly the wrong pairs are found; up to a tenth of them spoil neither the curve nor what is said of it."""

@@ -27,7 +27,7 @@ def distance_to_link(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> f
     return float(np.linalg.norm(np.cross(point - start, d)) / np.linalg.norm(d))
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(hnp.arrays(np.float64, (4, 3), elements=coordinates), hnp.arrays(np.float64, (6,), elements=coordinates))
 def test_no_link_is_nearer_than_the_one_that_is_named(irb140: Any, points: np.ndarray, q: np.ndarray) -> None:
     wire = irb140.wire(q, np.zeros(6))
@@ -38,7 +38,7 @@ def test_no_link_is_nearer_than_the_one_that_is_named(irb140: Any, points: np.nd
         assert all(d > min(distances) for d in distances[:link])  # the first of the nearest
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(
     hnp.arrays(np.float64, (8, 3), elements=coordinates),
     hnp.arrays(np.float64, (6,), elements=coordinates),
@@ -85,7 +85,7 @@ readings = st.lists(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(readings, st.integers(0, 6))
 def test_a_lost_point_counts_for_the_hold_time_and_no_longer(run: Any, series: list[list[float]], ticks: int) -> None:
     """Over any readings: a thing that counts goes on counting, what counts was seen lately, near counts at once.

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,7 +26,7 @@ def controller_of(robot: Any, **options: Any) -> qpsafe.SafetyController:
     return qpsafe.SafetyController(robot, [qpsafe.PositionTask("tcp", here)], **options)
 
 
-@settings(max_examples=30)
+@settings(max_examples=some(12, of=30))
 @given(st.lists(st.lists(metres, min_size=20, max_size=20), min_size=1, max_size=5), st.sampled_from((100.0, 1000.0)))
 def test_a_second_in_another_unit_is_noticed_and_metres_are_not(spots: Any, scenes: list, unit: float) -> None:
     """Whatever is seen, however it changes; each spot that sees something is named, and no others."""
@@ -44,7 +45,7 @@ def test_a_second_in_another_unit_is_noticed_and_metres_are_not(spots: Any, scen
     assert len(texts) <= len(spots) + 1  # it changes only when a spot joins: nothing is flooded
 
 
-@settings(max_examples=30)
+@settings(max_examples=some(12, of=30))
 @given(st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 3), min_size=1, max_size=6), st.data())
 def test_points_in_millimetres_are_noticed_and_in_metres_are_not(points: list, data: st.DataObject) -> None:
     array = np.array(points) + np.sign(np.array(points)) * 0.15  # none within 15 cm of the origin

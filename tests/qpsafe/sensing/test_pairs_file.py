@@ -55,7 +55,7 @@ def files(draw: Any) -> tuple[list[tuple[str, float, float]], str, str, str]:
     return pairs, head + out.getvalue(), code, delimiter
 
 
-@settings(max_examples=some(26, of=80))
+@settings(max_examples=some(13, of=80))
 @given(files())
 def test_what_was_meant_is_read(tmp_path_factory: Any, file: Any) -> None:
     pairs, text, code, _ = file
@@ -66,7 +66,7 @@ def test_what_was_meant_is_read(tmp_path_factory: Any, file: Any) -> None:
     assert [numbers for _, *numbers in found] == [pytest.approx(numbers, abs=1e-9) for _, *numbers in pairs]
 
 
-@settings(max_examples=some(26, of=80))
+@settings(max_examples=some(13, of=80))
 @given(files(), st.data())
 def test_what_is_damaged_is_read_or_refused_by_name(tmp_path_factory: Any, file: Any, data: Any) -> None:
     _, text, code, _ = file
@@ -111,7 +111,7 @@ def test_the_delimiter_found_and_the_columns_missing_are_named(tmp_path: Path, h
     assert said in caught.value.expected
 
 
-@settings(max_examples=30)
+@settings(max_examples=some(12, of=30))
 @given(
     st.floats(0.95, 1.05),
     st.sampled_from([(1.0, 1.0, None), (3.2808, 1.0, "feet"), (1.0, 0.66, "3.3 V?"), (1.0, 5.0 / 3.3, "5 V?")]),

@@ -33,7 +33,7 @@ def feed(sensing: DistanceSensing, q: np.ndarray, distances: np.ndarray, ages: n
     return sensing.update(state, state.wire(np.zeros(ROBOT.nq)), distances, ages)
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(
     st.floats(-1e9, 1e9) | st.floats(-0.1, 0.1),
     st.floats(-1e3, 1e3) | st.floats(-0.05, 0.05),
@@ -54,7 +54,7 @@ def test_a_process_that_dies_is_noticed_whatever_its_clock_says(
             assert sensing.health.dead.all()
 
 
-@settings(max_examples=some(20, of=60), deadline=None)
+@settings(max_examples=some(10, of=60), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(-0.009, 0.009), st.integers(1, 6))
 def test_an_honest_clock_is_believed(seed: int, skew: float, period: int) -> None:
     """Readings come every few ticks, late by some milliseconds, on a clock that differs by less than the tolerance."""
@@ -88,7 +88,7 @@ def test_ages_are_impossible_beyond_the_tolerance(ages: list[float], sick: bool)
     assert (sensing.health.codes == (IMPOSSIBLE_AGE if sick else HEALTHY)).all()
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_whatever_is_beyond_the_range_is_nothing_in_sight(seed: int) -> None:
     """Constant or not, while the robot moves in any way: the same as +inf, at every tick and for every spot."""

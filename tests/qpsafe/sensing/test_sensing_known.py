@@ -27,7 +27,7 @@ def inside(obstacle: Obstacle, point: np.ndarray, tolerance: float) -> bool:
     return bool(hulls.find(point[None], np.array([tolerance]), WORLD)[0] == 0)
 
 
-@settings(max_examples=some(33, of=100), deadline=None)
+@settings(max_examples=some(16, of=100), deadline=None)
 @given(st.integers(0, 2**32 - 1), vector, st.floats(0.0, 0.1))
 def test_a_hull_agrees_with_coal(seed: int, point: np.ndarray, tolerance: float) -> None:
     """Inside is inside; within the tolerance is inside; more than √3 tolerances away from its box is not."""
@@ -83,7 +83,7 @@ def test_an_obstacle_that_is_none_is_named(make: Any) -> None:
         make()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_points_on_the_robot_are_the_robot(irb140: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)

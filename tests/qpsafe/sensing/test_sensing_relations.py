@@ -32,7 +32,7 @@ def seen(robot: Any, q: np.ndarray, distances: np.ndarray, spots: Any = None, kn
     return sensing.update(robot.at(q), robot.wire(q, np.zeros(6)), distances)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(poses, poses, readings, st.floats(-1.5, 1.5))
 def test_turning_world_and_robot_together_changes_nothing(
     irb140: Any, q: np.ndarray, qd: np.ndarray, d: np.ndarray, angle: float
@@ -52,7 +52,7 @@ def test_turning_world_and_robot_together_changes_nothing(
     assert torques[1] == pytest.approx(torques[0], rel=1e-7, abs=1e-7)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=some(6, of=15), deadline=None)
 @given(poses, readings, st.integers(0, 2**32 - 1))
 def test_renumbering_spots_renumbers_points(irb140: Any, q: np.ndarray, d: np.ndarray, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(20)
@@ -68,7 +68,7 @@ MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 SIGNS = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(poses, poses, readings)
 def test_a_mirrored_robot_sees_a_mirrored_world(irb140: Any, q: np.ndarray, qd: np.ndarray, d: np.ndarray) -> None:
     """Left and right exchanged: joints 1, 4, 6 turn the other way, every spot moves to the other side."""
@@ -116,7 +116,7 @@ def test_other_units_in_the_robots_file_change_nothing(irb140: Any, tmp_path: An
     )
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(poses, poses, readings, st.integers(0, 19), st.floats(0.2, 0.8))
 def test_one_more_thing_in_sight_never_lowers_the_danger(
     irb140: Any, q: np.ndarray, qd: np.ndarray, d: np.ndarray, spot: int, nearer: float
@@ -129,7 +129,7 @@ def test_one_more_thing_in_sight_never_lowers_the_danger(
     assert cdf_n(irb140, q, qd, other.points) >= cdf_n(irb140, q, qd, one.points)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(poses, readings)
 def test_a_known_obstacle_takes_points_away_and_adds_none(irb140: Any, q: np.ndarray, d: np.ndarray) -> None:
     known = [qpsafe.Obstacle.box("block", (0.8, 0.8, 0.8), (0.7, 0.0, 0.5))]

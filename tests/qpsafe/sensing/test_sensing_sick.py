@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -213,7 +214,7 @@ readings = st.lists(
 )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=some(6, of=15), deadline=None)
 @given(readings, st.booleans())
 def test_whatever_is_read_the_tick_answers(run: Any, series: list[list[float]], velocities: bool) -> None:
     """Every point that counts is finite, every sick spot is named, and the command respects the limits (watched)."""

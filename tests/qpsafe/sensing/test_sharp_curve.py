@@ -97,7 +97,7 @@ def test_two_curves_of_a_spot_and_a_key_that_is_missing_are_named_with_their_lin
         read_calibration(tmp_path / "none.toml")
 
 
-@settings(deadline=None, max_examples=some(10, of=40))
+@settings(deadline=None, max_examples=some(5, of=40))
 @given(st.floats(-0.2, 5.0), st.floats(0.0, 5.0))
 def test_pairs_that_no_sensor_gives_are_named_as_pairs(rise: float, level: float) -> None:
     with pytest.raises(qpsafe.ConfigurationError, match="calibration of a: pairs"):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from amounts import some
+from amounts import some, thinned
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -156,7 +156,7 @@ def test_a_mutated_document_is_read_or_refused_by_name(kind: str, tmp_path: Path
     places = [match.span() for match in VALUE.finditer(text)]
     lines = text.splitlines(keepends=True)
 
-    @settings(ANY, max_examples=some(5, of=15) if kind == "robot" else some(15, of=40))
+    @settings(ANY, max_examples=some(3, of=15) if kind == "robot" else some(6, of=40))
     @given(st.data())
     def check(data: Any) -> None:
         what = data.draw(st.sampled_from(("value", "value", "value", "line", "bytes")))
@@ -197,7 +197,7 @@ documents = st.lists(
 ).map("\n".join)
 
 
-@settings(ANY, max_examples=some(15, of=40))
+@settings(ANY, max_examples=some(8, of=40))
 @given(documents | st.text(max_size=60) | st.binary(max_size=60), st.sampled_from(list(READERS)))
 def test_a_generated_document_is_read_or_refused_by_name(tmp_path_factory: Any, text: str | bytes, kind: str) -> None:
     outcome(kind, text, tmp_path_factory.getbasetemp())
@@ -221,7 +221,7 @@ BOMBS = {
 }
 
 
-@pytest.mark.parametrize("name", BOMBS)
+@pytest.mark.parametrize("name", thinned(2, BOMBS))
 def test_what_would_take_for_ever_is_refused(name: str, tmp_path: Path) -> None:
     """It ends at all: the time of each once grew with the square of its length, or the reader's stack overflowed."""
     assert isinstance(outcome("cell", BOMBS[name], tmp_path), ConfigurationError)
@@ -239,7 +239,7 @@ def test_nesting_is_read_up_to_a_depth(depth: int) -> None:
 SLOW = (ROOT / "sim/experiments/path/path.toml").read_text()
 
 
-@settings(ANY, max_examples=some(8, of=25))
+@settings(ANY, max_examples=some(4, of=25))
 @given(st.floats(1e-4, 1e3), st.floats(1e-4, 1e3), st.floats(1e-4, 1e6))
 def test_how_slow_a_program_is_does_not_matter(
     tmp_path_factory: Any, speed: float, acceleration: float, jerk: float

@@ -40,7 +40,10 @@ def test_no_sentence_puts_a_plural_behind_any_whole_number() -> None:
     for file in FILES:
         if any(parent.is_symlink() for parent in file.parents):
             continue
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        text = file.read_text(encoding="utf-8")
+        if not re.search(rf"\}}([\"']\s*f?[\"'])?{PLURAL.pattern}", text):  # no such word behind a value
+            continue
+        for node in ast.walk(ast.parse(text)):
             if not isinstance(node, ast.JoinedStr):
                 continue
             for value, after in zip(node.values, node.values[1:], strict=False):

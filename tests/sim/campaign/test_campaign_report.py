@@ -84,8 +84,9 @@ def test_the_contract_is_kept_in_json_that_every_reader_reads(found: dict[str, A
 
 
 def test_figures_are_those_of_the_rows(results: Results, found: dict[str, Any]) -> None:
+    rows = [row for k in range(60) for row in made_up_trials.run(PLAN, k)]
     for name, controller in found["controllers"].items():
-        mine = [row for k in range(60) for row in made_up_trials.run(PLAN, k) if row["controller"] == name]
+        mine = [row for row in rows if row["controller"] == name]
         assert controller["contacts"] == sum(row["contact"] for row in mine) == sum(controller["classes"].values())
         assert controller["contacts"] == sum(controller["regions"].values()) == sum(controller["seen"].values())
         assert controller["contacts"] == sum(motion["contacts"] for motion in controller["motions"].values())
@@ -125,6 +126,7 @@ def test_comparisons_are_corrected_together_and_agree_with_the_counts(found: dic
             assert 60 * item["difference"] == pytest.approx(a[item["measure"]] - b[item["measure"]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controllers", [("default",), ("none", "strict"), ("stop", "default")])
 def test_few_controllers_and_a_single_trial_make_a_report(controllers: tuple[str, ...]) -> None:
     made = played(Plan(trials=1, controllers=controllers))
@@ -139,6 +141,7 @@ def test_no_trial_makes_none(results: Results) -> None:
         summary(Results(PLAN, empty, 0.0, None, {}))
 
 
+@pytest.mark.slow
 def test_nobody_who_touches_makes_a_report() -> None:
     """Nothing to divide by, nothing to draw."""
     quiet = {"contact": False, "contact_class": "none", "contact_region": "", "near_seen": False, "progress": 0.0}

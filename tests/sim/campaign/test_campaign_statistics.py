@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -190,17 +191,17 @@ def test_blocks_of_resamples_change_nothing_and_seeds_do(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("item", [MEAN, MEDIAN], ids=str)
 def test_limits_hold_the_truth_about_as_often_as_they_say(item: Statistic) -> None:
-    """95 %, less what a percentile bootstrap of 60 trials lacks; of 300 experiments."""
-    rng = np.random.default_rng(7)
+    """95 %, less what a percentile bootstrap of 60 trials lacks."""
+    rng, count = np.random.default_rng(7), some(120, of=300)
     hits, rejected = 0, 0
-    for k in range(300):
+    for k in range(count):
         shared = rng.gamma(2.0, size=60)
         a, b = shared + rng.normal(size=60), shared + rng.normal(size=60)
         found = Bootstrap({"a": a, "b": b}, {"a": (item,), "b": (item,)}, 300, seed=k).difference("a", "b", item)
         hits += found.low <= 0.0 <= found.high
         rejected += (found.p or 1.0) < 0.05
-    assert 0.90 <= hits / 300 <= 0.995
-    assert rejected / 300 <= 0.10
+    assert 0.90 <= hits / count <= 0.995
+    assert rejected / count <= 0.10
 
 
 def test_columns_that_cannot_be_resampled_are_refused() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from amounts import first
+from amounts import first, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -150,7 +150,7 @@ def test_the_same_point_is_the_same_encounter_to_the_last_bit(seed: int) -> None
 
 
 @pytest.mark.parametrize("plan", [PLAIN, TABLES], ids=["plain", "tables"])
-@pytest.mark.parametrize("seed", first(8, range(20)))
+@pytest.mark.parametrize("seed", first(3, range(20)))
 def test_people_stay_people_whatever_they_do(seed: int, plan: FloorPlan) -> None:
     story = MODEL.encounter(MODEL.random(seed), plan)
     times = np.arange(0.0, story.duration, DT)
@@ -308,7 +308,7 @@ def test_the_corners_of_the_cube_are_encounters_too(value: float) -> None:
         st.tuples(st.floats(-1.0, 1.0), st.floats(0.2, 1.2), st.floats(-1.0, 1.0), st.floats(0.2, 1.2)), max_size=3
     ),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 def test_every_point_is_an_encounter_in_every_cell(unit, reach, floor, tool, boxes) -> None:
     """Nothing is refused, nothing is infinite, and nobody walks through what stands there."""
     obstacles = (PEDESTAL, *(Rectangle(x, x + a, y, y + b) for x, a, y, b in boxes))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import first
 
 from qpsafe.sim.campaign.people import EncounterModel
 from qpsafe.sim.campaign.plan import Plan
@@ -14,7 +15,6 @@ from qpsafe.sim.campaign.trials.meeting import meeting
 from qpsafe.sim.campaign.trials.rows import columns_of
 from qpsafe.sim.campaign.trials.trial import recorded, run_case, run_trial
 from qpsafe.sim.campaign.worst.cases import Encounter
-from qpsafe.sim.drawing.gl import gl_available
 
 BRAVE = """
 def make(station):
@@ -37,7 +37,7 @@ def _table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize("controller", ["default", "stop"])
+@pytest.mark.parametrize("controller", first(1, ["default", "stop"]))
 def test_the_row_is_the_campaigns_and_the_table_has_every_tick(tmp_path: Path, people: str, controller: str) -> None:
     plan = Plan(motions=("line",), people=people, controllers=(controller,), seed=4)
     told: list[tuple[int, int]] = []
@@ -74,7 +74,7 @@ def test_a_case_of_an_own_controller_without_opengl(tmp_path: Path, people: str)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not gl_available()[0], reason="no OpenGL")
+@pytest.mark.usefixtures("opengl")
 def test_ctrl_c_leaves_no_half_file(tmp_path: Path, people: str) -> None:
     def interrupt(done: int, _: int) -> None:
         if done == 30:
@@ -86,7 +86,7 @@ def test_ctrl_c_leaves_no_half_file(tmp_path: Path, people: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not gl_available()[0], reason="no OpenGL")
+@pytest.mark.usefixtures("opengl")
 def test_the_video_shows_a_frame_every_40_ms(tmp_path: Path, people: str) -> None:
     """Also of a controller that knows of no danger vectors."""
     imageio = pytest.importorskip("imageio")

@@ -15,7 +15,7 @@ POINTS = ((0.25, 0.0, 0.0), (0.15, 0.15, 0.0), (0.1, -0.2, 0.1), (0.05, 0.05, -0
 ROBOTS = {name: qpsafe.load_robot(name) for name in ("irb140", "iiwa14")}
 
 
-@pytest.mark.parametrize(("name", "lag"), first(2, product(ROBOTS, [0.02, 0.0, 0.008])))
+@pytest.mark.parametrize(("name", "lag"), first(1, product(ROBOTS, [0.02, 0.0, 0.008])))
 def test_whatever_the_lag_there_is_no_limit_cycle(name: str, lag: float) -> None:
     """While the arm gets away joints may turn round once each; from then on it creeps to rest."""
     robot: Any = ROBOTS[name]

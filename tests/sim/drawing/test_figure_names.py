@@ -5,7 +5,6 @@ from pathlib import Path
 
 import matplotlib.text
 import pytest
-from amounts import first
 
 import qpsafe
 from qpsafe.sim.drawing.plots import figure_11
@@ -33,7 +32,8 @@ def log() -> RunLog:
     return log
 
 
-@pytest.mark.parametrize("name", first(1, NAMES))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
 def test_a_name_is_drawn_as_it_is_written(
     name: str, log: RunLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -87,6 +87,7 @@ def test_nobody_there_it_keeps_its_pose(ready: Any) -> None:
     assert set(log.regime) == {"low"}
 
 
+@pytest.mark.slow
 def test_its_line_goes_through_its_home_and_nothing_is_wrong_with_it(ready: Any) -> None:
     robot = ready[0].robot
     arm = Arm.of(robot)

@@ -60,7 +60,7 @@ def check(robot: Robot, q: np.ndarray, missed: tuple[str, ...]) -> None:
     said = "; ".join(missed)
     for tool in robot.tool_frames:
         arm, pose = Arm.of(robot, tool, q), robot.pose(tool, q)
-        if f"{tool} points" not in said:
+        if f"{tool} looks" not in said:
             np.testing.assert_allclose(pose[:3, :3] @ tool_axis(robot, tool), [0.0, 0.0, -1.0], atol=0.09)
         if f"{tool} is" not in said:
             assert pose[0, 3] - arm.shoulder[0] > 0.2 * arm.length
@@ -96,5 +96,5 @@ def test_two_arms_side_by_side_have_the_same_home(tmp_path: Path) -> None:
 def test_what_is_missed_is_written_down(tmp_path: Path) -> None:
     """Three joints hold no tool any way round."""
     found = choices(load_quietly(write_arms(tmp_path, [0.0], [3], False)), sensors=False)
-    assert any("of the home posture, not as it should be: tool0 points" in item for item in found.said), found.said
-    assert "tool0 points" in found.robot_toml(tmp_path)
+    assert any("of the home posture, not as it should be: tool0 looks" in item for item in found.said), found.said
+    assert "tool0 looks" in found.robot_toml(tmp_path)

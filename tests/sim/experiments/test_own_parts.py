@@ -32,7 +32,7 @@ def log_of(experiment: Any) -> Any:
     return getattr(found, "log", found)
 
 
-@pytest.fixture(params=first(2, EXPERIMENTS))
+@pytest.fixture(params=first(1, EXPERIMENTS))
 def make(request: pytest.FixtureRequest) -> Callable[..., Any]:
     return EXPERIMENTS[request.param]
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import struct
 import tomllib
 import warnings
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -57,11 +59,20 @@ def package(folder: Path, mesh: str, joints: int = 6) -> Path:
     return file
 
 
+@cache
+def skin(joints: int) -> str:
+    """Sensors for the arm, chosen once: its shapes are the same wherever its meshes lie."""
+    with TemporaryDirectory() as folder:
+        file = package(Path(folder), MESHES[0], joints)
+        (file.parent / "robot.toml").write_text(starting_robot_toml(load_quietly(file), file.parent), encoding="utf-8")
+        return skin_toml(load_quietly(file.parent))[0]
+
+
 def described(file: Path) -> Robot:
     """The robot of a folder that is the model's own, as `qpsafe robots add` writes it by default."""
     text = starting_robot_toml(load_quietly(file), file.parent, spots="spots.toml")
     (file.parent / "robot.toml").write_text(text, encoding="utf-8")
-    (file.parent / "spots.toml").write_text(skin_toml(load_quietly(file.parent))[0], encoding="utf-8")
+    (file.parent / "spots.toml").write_text(skin(load_quietly(file.parent).nq), encoding="utf-8")
     return load_quietly(file.parent)
 
 

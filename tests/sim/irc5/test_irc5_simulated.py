@@ -37,7 +37,7 @@ def cycle(irc5: SimulatedIrc5, *answers: bytes):
 
 
 @given(st.floats(0.1, 20.0), st.floats(-0.3, 0.3))  # below the cap on speed
-@settings(max_examples=30)
+@settings(max_examples=some(12, of=30))
 def test_without_speed_and_low_pass_the_error_decays_by_the_gain(gain: float, step: float) -> None:
     law = MotionLaw(EgmSettings(gain=gain, lowpass=0.0), DT, HOME)
     law.refer(HOME + step, STILL)
@@ -57,7 +57,7 @@ def test_a_position_with_its_speed_is_followed_without_lag() -> None:
 
 
 @given(st.floats(-1.0, 1.0), st.integers(1, 400))
-@settings(max_examples=30)
+@settings(max_examples=some(12, of=30))
 def test_a_lost_answer_lets_the_robot_run_on_to_a_bound(speed: float, cycles: int) -> None:
     """To pos_ref + speed_ref / k at most, plus what the low pass still holds."""
     law = MotionLaw(EgmSettings(), DT, HOME)
@@ -194,7 +194,7 @@ def test_a_good_wire_changes_nothing() -> None:
     st.floats(0.0, 1.0),
     st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=some(16, of=50))
+@settings(max_examples=some(8, of=50))
 def test_what_goes_in_comes_out_or_is_counted(
     loss: float, delay: float, reorder: float, duplicate: float, seed: int
 ) -> None:

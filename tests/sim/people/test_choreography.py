@@ -44,7 +44,7 @@ def test_every_part_of_the_person_moves_without_jumps():
         assert speed < (4.2 if segment.name.endswith(("foot", "shank", "thigh")) else 1.3), segment.name
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", first(2, range(6)))
 def test_the_pauses_are_where_the_approaches_say(seed):
     choreography = NOMINAL.varied(seed)
     for phase in choreography.phases:
@@ -65,7 +65,7 @@ def test_the_pauses_are_where_the_approaches_say(seed):
             )
 
 
-@pytest.mark.parametrize("seed", first(4, range(12)))
+@pytest.mark.parametrize("seed", first(2, range(12)))
 def test_between_approaches_the_board_is_far_away_and_the_last_withdrawal_is_early_enough(seed):
     choreography = NOMINAL.varied(seed)
     assert choreography.clear_time <= (49.0 if seed == 0 else choreography.duration - 10.0)
@@ -91,7 +91,7 @@ def test_nobody_sinks_into_the_floor():
     assert lowest >= NOMINAL.person.floor - 1e-9
 
 
-@settings(max_examples=some(15, of=40))
+@settings(max_examples=some(8, of=40))
 @given(st.floats(0.0, 60.0))
 def test_board_distance_is_the_horizontal_distance_to_the_face(t):
     pose = NOMINAL.pose(t)

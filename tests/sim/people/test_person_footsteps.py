@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+from amounts import some
 
 from qpsafe.sim.people.footsteps import Footsteps
 from qpsafe.sim.people.person import Person
@@ -27,10 +28,10 @@ def test_one_foot_always_stands_and_standing_feet_do_not_slip(walk):
     ordered = sorted((s for side in steps.steps for s in side), key=lambda s: s.start)
     assert all(a.end < b.start for a, b in itertools.pairwise(ordered))  # never both in the air
     before = steps(0.0)
-    for t in np.arange(0.01, 8.0, 0.01):
+    for t in np.arange(0.01, 8.0, some(2, of=1) / 100):
         now = steps(t)
         for side in (0, 1):
-            swinging = any(s.start < t <= s.end + 0.01 for s in steps.steps[side])
+            swinging = any(s.start < t <= s.end + some(2, of=1) / 100 for s in steps.steps[side])
             assert swinging or now[side] == before[side]
         before = now
 
@@ -38,7 +39,7 @@ def test_one_foot_always_stands_and_standing_feet_do_not_slip(walk):
 def test_feet_keep_up_with_the_body(walk):
     person = Person()
     steps = Footsteps(person, walk, 8.0)
-    for t in np.arange(0.0, 8.0, 0.02):
+    for t in np.arange(0.0, 8.0, some(4, of=2) / 100):
         for foot, home in zip(steps(t), person.standing_feet(*walk(t)), strict=True):
             assert math.hypot(foot.x - home.x, foot.y - home.y) < 0.42
             assert abs(math.remainder(foot.yaw - home.yaw, 2 * math.pi)) < 0.8

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from amounts import some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,7 @@ MOVERS = {"choreography": Choreography(), "reaches": STORY.people[0], "puts a bo
 
 @pytest.mark.parametrize("name", MOVERS)
 @given(st.lists(st.floats(-1.0, 30.0), min_size=1, max_size=30))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=some(4, of=10), deadline=None)
 def test_many_times_at_once_are_each_time_alone_in_any_order(name: str, times: list[float]) -> None:
     mover = MOVERS[name]
     poses = mover.poses_at(np.array(times))

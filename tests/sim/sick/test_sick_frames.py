@@ -34,6 +34,7 @@ def image(stamp: float, offset: float = 0.0):
     return SENSOR.image(np.arange(64.0) / 64 + offset, stamp=stamp, sigma=np.full(64, 0.01))
 
 
+@pytest.mark.slow
 def test_some_cases_react_as_promised() -> None:
     cases = [case for case in FRAME_CASES if case.name in FEW]
     experiment = FixedExperiment(ROBOT, choreography=BRIEF, duration=5.0, sensor="vl53l5cx")

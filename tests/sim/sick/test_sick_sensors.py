@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import typer
+from amounts import first, some
 from typer.testing import CliRunner
 
 import qpsafe
@@ -63,8 +64,10 @@ def test_a_case_that_could_show_at_no_moment_is_not_kept_nor_excused(wrong, caps
 
 
 def test_every_case_reacts_as_promised():
-    results = run_matrix(FixedExperiment(ROBOT, choreography=BRIEF, duration=5.0), count=1, seed=4, jobs=1)
-    assert [result.case for result in results] == [case.name for case in CASES]
+    cases = CASES[:: some(3, of=1)]
+    experiment = FixedExperiment(ROBOT, choreography=BRIEF, duration=5.0)
+    results = run_matrix(experiment, count=1, seed=4, cases=cases, jobs=1)
+    assert [result.case for result in results] == [case.name for case in cases]
     for result in results:
         assert result.kept is (True if result.applied else None), result
     assert sum(result.applied for result in results) >= len(results) - 1  # the moment is one where all can show
@@ -89,7 +92,7 @@ def test_the_first_experiment_keeps_its_promises_with_sharp_sensors():
         assert set(log.status) == {"ok"}
 
 
-@pytest.mark.parametrize(("count", "expected"), [(1, []), (2, [2])])
+@pytest.mark.parametrize(("count", "expected"), first(1, [(2, [2]), (1, [])]))
 def test_there_are_never_more_processes_than_moments(count, expected, monkeypatch):
     asked = []
 

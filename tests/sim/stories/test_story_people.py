@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from amounts import some
+from amounts import crossed, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,7 +123,7 @@ def test_nothing_jumps_and_bones_keep_their_lengths(story: Story, ends: np.ndarr
     st.floats(0.5, 2.0),
     st.sampled_from(["travel", "keep"]),
 )
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 def test_nobody_walks_faster_than_said_and_everybody_arrives(places, speed, facing) -> None:
     places = [place for a, place in zip([(5.0, 5.0), *places], places, strict=False) if math.dist(a, place) > 0.05]
     places = places or [(1.0, 1.0)]
@@ -167,8 +167,7 @@ def test_standing_feet_do_not_slide_and_feet_stay_above_the_floor(story: Story, 
             assert np.linalg.norm(np.diff(toe, axis=0), axis=1)[both].max() < 2e-4
 
 
-@pytest.mark.parametrize("arm", ["left", "right", "both"])
-@pytest.mark.parametrize("z", [-0.4, -0.1, 0.3, 0.8, 1.2])
+@pytest.mark.parametrize(("arm", "z"), crossed(["left", "right", "both"], [-0.4, -0.1, 0.3, 0.8, 1.2]))
 def test_the_hand_is_at_the_point_from_the_end_of_the_step_on(arm: str, z: float) -> None:
     """From the floor to over the head, after a walk, also for both hands."""
     point = (1.05, -0.1, z)

@@ -69,7 +69,7 @@ KEYS = st.sampled_from(["delta", "mass", "calm"])
 VALUES = st.one_of(st.floats(0.001, 1e6), st.lists(st.floats(0.1, 9.0), min_size=1, max_size=4))
 
 
-@settings(max_examples=some(20, of=60))
+@settings(max_examples=some(10, of=60))
 @given(st.dictionaries(KEYS, VALUES, min_size=1), st.booleans())
 def test_an_edited_text_says_what_it_should_and_keeps_the_rest(values: dict[str, object], there: bool) -> None:
     text = 'name = "[danger]"  # [danger]\nlinks = [\n    ["a", "b"],\n    ["c"],\n]\n\n'

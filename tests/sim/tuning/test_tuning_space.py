@@ -44,7 +44,7 @@ def test_the_present_values_are_those_of_a_default_controller(name: str) -> None
 SPACE = Space.of(qpsafe.load_robot("irb140"))
 
 
-@settings(max_examples=some(20, of=60))
+@settings(max_examples=some(10, of=60))
 @given(st.lists(st.floats(0.0, 1.0), min_size=len(SPACE.dimensions), max_size=len(SPACE.dimensions)))
 def test_every_point_can_be_made_and_rounding_changes_nothing_twice(shares: list[float]) -> None:
     point = {d.name: min(max(d.at(share), d.low), d.high) for d, share in zip(SPACE.dimensions, shares, strict=True)}

@@ -65,7 +65,7 @@ coordinate = st.floats(-2.0, 2.0)
 point = st.tuples(coordinate, coordinate, st.floats(-0.5, 1.4)).map(np.array)
 
 
-@settings(max_examples=some(83, of=250))
+@settings(max_examples=some(42, of=250))
 @given(coordinate, coordinate, st.floats(-math.pi, math.pi), point, point, st.floats(0.05, 6.0))
 def test_rays_agree_with_geometry(x, y, heading, origin, target, cutoff):
     pose = SCENE.person.pose(x, y, heading)

@@ -33,7 +33,7 @@ def test_points_are_where_mujocos_rays_hit(name):
     scene, spots, rng = build_scene(robot), qpsafe.load_spots(robot), np.random.default_rng(0)
     data, hit_geom = scene.make_data(), np.zeros(1, dtype=np.int32)
     worst, hits, seen = 0.0, 0, set()
-    for k in range(some(300, of=1000)):
+    for k in range(some(100, of=1000)):
         q = rng.uniform(robot.lower, robot.upper)
         data.qpos[scene.q_addresses] = q
         if k % 10 == 0:
@@ -53,7 +53,7 @@ def test_points_are_where_mujocos_rays_hit(name):
         worst = max(worst, float(np.abs(points - expected)[found].max(initial=0.0)))
         hits += int(found.sum())
     assert worst < 1e-9
-    assert hits > some(1500, of=5000)
+    assert hits > some(500, of=5000)
     assert seen == {0, 1, 3}  # floor and pedestal, person and board, the robot itself
 
 

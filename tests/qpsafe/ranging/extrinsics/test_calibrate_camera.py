@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amounts import some
 from camera_calibration import errors, somebody
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -40,6 +41,7 @@ def test_a_camera_is_found_from_a_guess(studio: Any) -> None:
     assert (place < 40.0, angle < 1.0, middle < 5.0) == (True, True, True)
 
 
+@pytest.mark.slow
 def test_other_joint_angles_are_told(studio: Any) -> None:
     """Images that do not belong to the joints: no pose explains them."""
     rng = np.random.default_rng(2)
@@ -82,7 +84,7 @@ def test_a_robot_at_rest_tells_nothing(studio: Any) -> None:
         calibrate_camera(studio.robot, still)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_rays_meet_the_hulls_where_their_half_spaces_begin(studio: Any, seed: int) -> None:
     """Against the definition: the place is on the surface, nothing of the ray before it is inside any hull."""

@@ -28,7 +28,7 @@ def distances(points: np.ndarray, wire: Any) -> np.ndarray:
     return np.array([np.linalg.norm(samples - p, axis=1).min() for p in points])
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(poses, poses, seeds, st.floats(0.0, 0.3))
 def test_danger_is_never_less(irb140: Any, q: np.ndarray, qd: np.ndarray, seed: int, elapsed: float) -> None:
     """The robot may come, go, or stand: the point counts at least as much as it does at rest, where it was seen."""
@@ -50,7 +50,7 @@ def test_danger_is_never_less(irb140: Any, q: np.ndarray, qd: np.ndarray, seed: 
     assert (np.linalg.norm(moving, axis=1) <= np.linalg.norm(velocities, axis=1) + 1e-12).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(poses, seeds)
 def test_what_comes_nearer_to_a_robot_at_rest_is_more_danger(irb140: Any, q: np.ndarray, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -72,7 +72,7 @@ def person_speed() -> Any:
     return numba.njit(lambda x, v_h, a, t, most: inner((x, 0.0, 0.0), v_h, a, t, most))
 
 
-@settings(max_examples=some(33, of=100), deadline=None)
+@settings(max_examples=some(16, of=100), deadline=None)
 @given(st.floats(-4.0, 4.0), st.floats(0.0, 2.0), st.floats(0.0, 10.0), st.floats(0.0, 1.0), st.floats(0.0, 3.0))
 def test_a_ball_is_never_smaller(
     person_speed: Any, speed: float, usual: float, acceleration: float, time: float, most: float

@@ -44,7 +44,7 @@ def rotation(rng: np.random.Generator) -> np.ndarray:
     return Q * np.sign(np.linalg.det(Q))
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(seeds, rates, st.sampled_from([0.002, 0.01, 0.02]), st.integers(1, 60))
 def test_what_rests_does_not_move(seed: int, rate: float, sigma: float, count: int) -> None:
     """Noise of three deviations is taken for none; of one or two points alone more than that is seen now and then."""
@@ -54,7 +54,7 @@ def test_what_rests_does_not_move(seed: int, rate: float, sigma: float, count: i
     assert np.mean(moving) <= (0.03 if count < 4 else 0.0)
 
 
-@settings(max_examples=some(15, of=40), deadline=None)
+@settings(max_examples=some(8, of=40), deadline=None)
 @given(seeds, rates, st.floats(0.5, 2.0))
 def test_a_constant_velocity_is_found(seed: int, rate: float, speed: float) -> None:
     """Within 0.5 m/s with a noise of 1 cm, 0.3 m/s on average, and never too fast: after four images, and a window.
@@ -80,7 +80,7 @@ def test_there_is_none_before_the_fourth_image() -> None:
         assert velocities.any() == (k >= 3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds, st.sampled_from([5.0, 15.0, 30.0]))
 def test_turned_moved_renumbered_and_later_is_the_same(seed: int, rate: float) -> None:
     rng = np.random.default_rng(seed)
@@ -93,7 +93,7 @@ def test_turned_moved_renumbered_and_later_is_the_same(seed: int, rate: float) -
         assert two == pytest.approx((one @ R.T)[order], abs=1e-6)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=some(10, of=25), deadline=None)
 @given(seeds, st.sampled_from([15.0, 30.0]))
 def test_what_is_uncovered_does_not_move(seed: int, rate: float) -> None:
     """A standing cloud of which more and more is seen, then less: as a robot before it uncovers and covers it."""
@@ -106,7 +106,7 @@ def test_what_is_uncovered_does_not_move(seed: int, rate: float) -> None:
         assert not tracks.update(k / rate, points, 0.005).any()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 @given(seeds, st.floats(0.8, 1.5))
 def test_two_people_who_pass_keep_their_velocities(seed: int, speed: float) -> None:
     rng = np.random.default_rng(seed)
@@ -150,7 +150,7 @@ def test_bad_data_has_no_velocity_and_does_no_harm() -> None:
 
 
 @given(seeds)
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=some(2, of=5), deadline=None)
 def test_what_is_beyond_the_most_moves_as_its_neighbours(seed: int) -> None:
     rng = np.random.default_rng(seed)
     cloud = body(rng, 20)
@@ -162,7 +162,7 @@ def test_what_is_beyond_the_most_moves_as_its_neighbours(seed: int) -> None:
 
 
 @given(seeds, st.floats(0.1, 0.5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(8, of=20), deadline=None)
 def test_a_wall_that_a_sensor_slides_along_rests(seed: int, speed: float) -> None:
     """The samples move with the sensor, so from points alone they would move; its own motion explains it."""
     rng = np.random.default_rng(seed)

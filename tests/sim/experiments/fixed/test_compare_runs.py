@@ -1,6 +1,7 @@
 """Whole runs: the QP form of the law against the paper's own, in closed loop with the plant."""
 
 import numpy as np
+from amounts import some
 
 import qpsafe
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
@@ -21,7 +22,7 @@ HASTE = Choreography(
 
 def test_joint_trajectories_are_equal_without_limits_and_differ_where_limits_bind() -> None:
     """Through low, medium and into high danger."""
-    result = compare_closed_loop(qpsafe.load_robot("irb140"), 2.2, choreography=HASTE)
+    result = compare_closed_loop(qpsafe.load_robot("irb140"), some(16, of=22) / 10, choreography=HASTE)
     assert 0.0 < result.trajectory_deviation <= 1e-6  # two computations, the same motion
     assert result.largest_step_source > 2.0  # which no limit held back
     assert 100 < result.explained == result.different < result.ticks  # where they differ, a limit binds

@@ -129,7 +129,8 @@ def test_a_shorter_run_leaves_promises_out_and_breaks_none(
 
 
 def test_the_figure_is_drawn(strict: PathRun, tmp_path: Path) -> None:
-    side_by_side({"strict": strict, "again": strict}, ROBOT, tmp_path / "figure.png")
+    part = cut(strict, 1500)
+    side_by_side({"strict": part, "again": part}, ROBOT, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -75,7 +75,8 @@ class Scared:
         return distances
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
 def test_suspensions_neither_lose_nor_repeat_events(alone: PickRun, seed: int) -> None:
     """Metamorphic: frights at any time delay what happens to the screws, and change nothing else."""
     rng = np.random.default_rng(seed)
