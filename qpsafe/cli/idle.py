@@ -6,6 +6,7 @@ A table says of every command when its options count; those that it does not nam
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -37,6 +38,7 @@ SOLVER = Rule(("solver",), lambda given: given["law"] != "nullspace", "only with
 VIDEO = Rule(
     ("video",), lambda given: not (given["video"] and given["view"]), "only without --view, which films nothing"
 )
+WORKERS = Rule(("workers",), lambda given: not given["dask"], "only without --dask, whose workers play")
 PAGE = Rule(("web_host", "web_port", "web_token"), lambda given: given["web"], "only together with --web")
 
 #: Command -> when its options count.
@@ -54,6 +56,17 @@ RULES: dict[str, tuple[Rule, ...]] = {
     "demo path": (VIDEO,),
     "demo fast-person": (PROJECTION, VIDEO),
     "demo pick-and-place": (PROJECTION, SOLVER, VIDEO),
+    "campaign run": (WORKERS,),
+    "campaign worst": (WORKERS,),
+    "campaign limit": (
+        WORKERS,
+        Rule(
+            ("dask", "workers"),
+            lambda given: os.path.isdir(given["trial"]),
+            "only with a campaign's folder: one trial is searched here",
+        ),
+    ),
+    "tune": (WORKERS,),
     "compare": (
         Rule(
             ("duration", "full"), lambda given: given["closed_loop"], "only with whole runs, not with --no-closed-loop"

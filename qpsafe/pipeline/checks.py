@@ -112,10 +112,10 @@ def checked_law(law: Law, tasks: int | None = None) -> Law:
     return law
 
 
-def checked_field(field: Any) -> Any:
-    """`field`, if it can be asked."""
+def checked_field(field: Any, where: str = "SafetyController") -> Any:
+    """`field`, if it can be asked; the error says who asks."""
     if isinstance(field, type) or not callable(getattr(field, "evaluate", None)):
-        raise ConfigurationError("SafetyController", "field", field, "a DangerField")
+        raise ConfigurationError(where, "field", field, "a DangerField")
     return field
 
 
@@ -130,13 +130,14 @@ def checked_gate(gate: VerifiedMotion | str | None, robot: Robot) -> VerifiedMot
     return gate
 
 
-def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float) -> Evasion:
+def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float, where: str = "SafetyController") -> Evasion:
     """`evasion`, if it is one of this robot and this tick.
 
     Args:
         evasion: As given; None for that of the robot, "paper" for M = 4, D = 20.
         robot: Whose joints move.
         dt: Tick [s].
+        where: Who asks, for the error.
     """
     if evasion is None:
         return Evasion.for_robot(robot, dt)
@@ -144,9 +145,9 @@ def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float) -> E
         return Evasion.paper(robot.nq, dt)
     if not (isinstance(evasion, Evasion) and evasion.velocity.shape == (robot.nq,)):
         expected = f'an Evasion of {counted(robot.nq, "joint")}, or "paper"'
-        raise ConfigurationError("SafetyController", "evasion", evasion, expected)
+        raise ConfigurationError(where, "evasion", evasion, expected)
     if evasion.dt != dt:
-        raise ConfigurationError("SafetyController", "evasion.dt", evasion.dt, f"the controller's tick, dt = {dt} s")
+        raise ConfigurationError(where, "evasion.dt", evasion.dt, f"the tick, dt = {dt} s")
     return evasion
 
 

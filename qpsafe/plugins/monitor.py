@@ -116,7 +116,7 @@ class DangerMonitor:
 
     @field.setter
     def field(self, field: Any) -> None:
-        self._field = checked_field(field)
+        self._field = checked_field(field, "DangerMonitor")
 
     @property
     def activation(self) -> Activation:
@@ -139,7 +139,7 @@ class DangerMonitor:
 
     @evasion.setter
     def evasion(self, evasion: Evasion | str | None) -> None:
-        self._evasion = own_evasion(self, checked_evasion(evasion, self._robot, self._dt))
+        self._evasion = own_evasion(self, checked_evasion(evasion, self._robot, self._dt, "DangerMonitor"))
 
     @property
     def limits(self) -> JointLimits | Literal["off"]:

@@ -33,6 +33,8 @@ def numbers(where: str, key: str, value: Any, expected: str, ndim: int | None = 
         given = np.asarray(value)
         masked = np.ma.is_masked(np.ma.asarray(value)) if isinstance(value, list | tuple) else np.ma.is_masked(value)
         good = given.dtype.kind in "fiu" and not masked and ndim in (None, given.ndim)
+        if good and isinstance(value, list | tuple):  # True beside numbers would count as 1
+            good = not any(isinstance(one, bool | np.bool_) for one in np.array(value, dtype=object).flat)
     except Exception:  # whatever a stranger's __array__ raises
         good = False
     if not good:

@@ -19,6 +19,7 @@ from qpsafe.sim.campaign.trials.meeting import meeting
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.campaign.trials.sight import first_seen
 from qpsafe.sim.campaign.trials.trial import recorded
+from qpsafe.text.given import whole
 
 if TYPE_CHECKING:
     from qpsafe.sim.campaign.plan import Plan
@@ -57,7 +58,9 @@ def limit_of(plan: Plan, what: int | Case, controller: str, evaluations: int = E
 
     Raises:
         MissingExtraError: cma is not installed.
+        ConfigurationError: No number of motions.
     """
+    evaluations = whole("limit_of", "evaluations", evaluations, "a whole number >= 1", 1)
     met = meeting(plan, what)
     run, alone = recorded(plan, met, controller), recorded(plan, met, ALONE)
     first, end = _first_sight(run, met), len(run.q) - 1

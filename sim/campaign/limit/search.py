@@ -81,7 +81,7 @@ class _Search:
 
     def _screened(self, tried: Sequence[Array], since: NDArray[np.int64]) -> list[Way]:
         """Single goals, the best first."""
-        random = self._rng.uniform(self._lower, self._upper, (self._whole // 4 - len(tried), len(self._lower)))
+        random = self._rng.uniform(self._lower, self._upper, (max(self._whole // 4 - len(tried), 0), len(self._lower)))
         ways: list[Way] = []
         for goal in (*tried, *random):
             if self._over:

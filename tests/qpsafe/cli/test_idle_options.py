@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,7 +17,6 @@ from qpsafe.errors import ConfigurationError
 Parsed = Callable[[str, list[str]], Any]
 
 #: Their tests, and rules, are of their own.
-OTHERS = ("campaign", "tune")
 NONE: list[str] = []
 
 VIDEO = {"video": (["--video"], ["--view"], [NONE])}
@@ -27,6 +27,7 @@ PAGE = {
     "web_port": (["--web-port", "8080"], NONE, [["--web"]]),
     "web_token": (["--web-token", "secret"], NONE, [["--web"]]),
 }
+WORKERS = {"workers": (["--workers", "2"], ["--dask", "tcp://a:1"], [NONE])}
 #: Command -> option -> how it is typed, beside what it does nothing, and what makes it count.
 IDLE: dict[str, dict[str, tuple[list[str], list[str], list[list[str]]]]] = {
     "demo fixed": {
@@ -35,6 +36,10 @@ IDLE: dict[str, dict[str, tuple[list[str], list[str], list[list[str]]]]] = {
         **SOLVER,
         "spots": (["--spots", "a.toml"], ["--sensor", "vl53l5cx"], [NONE, ["--sensor", "sharp+depth"]]),
     },
+    "campaign run": WORKERS,
+    "campaign worst": WORKERS,
+    "campaign limit": {"workers": (["--workers", "2"], NONE, []), "dask": (["--dask", "tcp://a:1"], NONE, [])},
+    "tune": WORKERS,
     "demo path": VIDEO,
     "demo fast-person": {**VIDEO, **PROJECTION},
     "demo pick-and-place": {**VIDEO, **PROJECTION, **SOLVER},
@@ -68,6 +73,12 @@ ALWAYS = {
     "demo path": "robot seed lag duration program unchecked solver story out view json",
     "demo fast-person": "robot speed experiment law lag sensor out view json",
     "demo pick-and-place": "robot seed seeds cycles people program unchecked lag law sensor jobs out view json",
+    "campaign run": "quick trials controllers seed robot motions sensor lag people cell dask out json",
+    "campaign show": "controller plan seed robot motions sensor lag people cell out json",
+    "campaign worst": "trials plan seed robot motions sensor lag people cell dask out json",
+    "campaign limit": "controller plan seed robot motions sensor lag people cell evaluations json",
+    "campaign report": "out json",
+    "tune": "robot program cell people trials minutes seed prefer finals judge dask write out json",
     "compare": "states seed tolerance closed_loop solver json",
     "bench": "out json compile",
     "check": "robot cell out json",
@@ -112,7 +123,7 @@ def test_every_command_looks_at_its_options() -> None:
     assert set(RULES) <= set(ALL)
 
 
-@pytest.mark.parametrize("path", [path for path in ALL if path.split()[0] not in OTHERS])
+@pytest.mark.parametrize("path", ALL)
 def test_of_every_option_it_is_known_whether_it_always_counts(path: str) -> None:
     options = [part.name for part in ALL[path].params if part.param_type_name == "option"]
     ruled = {option for rule in RULES.get(path, ()) for option in rule.options}
@@ -144,3 +155,14 @@ def test_an_option_that_does_nothing_is_refused_by_its_name(
 )
 def test_what_asks_for_nothing_may_do_nothing(path: str, words: list[str], parsed: Parsed) -> None:
     parsed(path, words)
+
+
+def test_who_searches_counts_where_there_is_a_folder_of_trials(
+    parsed: Parsed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x").mkdir()
+    for words in (["--workers", "2"], ["--dask", "tcp://a:1"]):
+        parsed("campaign limit", words)
+    with pytest.raises(ConfigurationError, match="--workers"):
+        parsed("campaign limit", ["--workers", "2", "--dask", "tcp://a:1"])

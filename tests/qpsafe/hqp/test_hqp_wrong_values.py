@@ -38,6 +38,9 @@ WRONG = {
     "lists of text": lambda x: x.astype(str).tolist(),
     "truth": lambda x: x > 0.0,
     "lists of truth": lambda x: (x > 0.0).tolist(),
+    "truth beside numbers": lambda x: np.where(
+        np.arange(x.size).reshape(x.shape) == 0, True, x.astype(object)
+    ).tolist(),
     "dates": lambda x: x.astype("M8[D]"),
     "spans": lambda x: x.astype("m8[s]"),
     "objects": lambda x: x.astype(object),

@@ -58,6 +58,9 @@ NONE: dict[str, Callable[[np.ndarray, int], Any]] = {
     "bytes": lambda v, _: v.astype(bytes),
     "truth": lambda v, _: v.astype(bool),
     "truth in lists": lambda v, _: v.astype(bool).tolist(),
+    "truth beside numbers": lambda v, where: np.where(
+        np.arange(v.size).reshape(v.shape) == where % v.size, True, v.astype(object)
+    ).tolist(),
     "complex": lambda v, _: v.astype(complex),
     "complex in lists": lambda v, _: v.astype(complex).tolist(),
     "masked": masked,

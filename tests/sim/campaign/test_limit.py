@@ -12,7 +12,7 @@ import pytest
 from amounts import first, some
 
 import qpsafe
-from qpsafe.errors import RobotWarning
+from qpsafe.errors import ConfigurationError, RobotWarning
 from qpsafe.limits import JointLimits, stopping_speed
 from qpsafe.sim.campaign.limit.escape import TOUCHING, Escape
 from qpsafe.sim.campaign.limit.limit import Best, limit_of
@@ -278,3 +278,17 @@ def test_who_stands_still_near_the_tool_need_come_no_nearer(people: str) -> None
     assert escape.fixed == near[k]
     assert tried < FEW
     assert escape.distance(escape.motion(found.goals, found.since)) == near[k]
+
+
+@pytest.mark.parametrize("evaluations", [1, 3, 20])
+def test_a_handful_of_motions_is_a_search_too(plan: Plan, evaluations: int) -> None:
+    """Fewer than those that are tried in any case were a bare ValueError."""
+    found = limit_of(plan, 0, "default", evaluations)
+    assert found.limit.evaluations <= evaluations
+    assert found.limit.distance <= found.limit.limit or np.isnan(found.limit.limit)
+
+
+@pytest.mark.parametrize("evaluations", [0, -1, 2.5, True, "many", None])
+def test_no_number_of_motions_is_named(plan: Plan, evaluations: Any) -> None:
+    with pytest.raises(ConfigurationError, match="evaluations"):
+        limit_of(plan, 0, "default", evaluations)
