@@ -79,11 +79,21 @@ STANDING = ("contacts", "moving", "towards", "over_limit")
 
 
 def standing() -> str:
-    """The default controller beside the one whose links go on where they cannot get away, a sensor after the other."""
+    """The default controller beside the one whose links go on where they cannot get away."""
+    return _beside("judged-standing", "unheld")
+
+
+def friction() -> str:
+    """The default controller beside the one whose evasion has no friction."""
+    return _beside("judged-friction", "creeping")
+
+
+def _beside(file: str, other: str) -> str:
+    """The default controller beside another one that met the same people, a sensor after the other."""
     rows = []
-    for sensor, found in measured("judged-standing").items():
+    for sensor, found in measured(file).items():
         less = {row["measure"]: row for row in found["comparisons"]}
-        for name in ("unheld", "default"):
+        for name in (other, "default"):
             run = found["controllers"][name]
             shares = [
                 f"{run[key]} of {run['trials']:,}: {share(run[key] / run['trials'], *run['intervals'][key])}"
@@ -99,6 +109,7 @@ def standing() -> str:
 
 TABLES = {
     "standing": standing,
+    "friction": friction,
     "images": images,
     "place-arrays": place_arrays,
     "camera-calibration": camera_calibration,

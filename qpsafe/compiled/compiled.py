@@ -93,7 +93,8 @@ def entry(
     Args:
         types_: Types of arguments and result.
         uses: Other modules whose compiled code goes into this one, beside this and `memory`. numba's cache notices
-            changes of the entry's own file only; so the name it is kept under tells the state of these.
+            changes of the entry's own file only; so the name it is kept under tells the state of these, and what was
+            linked in them and in its own: code in the cache that calls what is not there any more ends the process.
         nogil: Whether other threads may run meanwhile; memory that is handed in must then be the thread's own.
         python: Whether Python calls it; else only other compiled code does, by `linked`.
     """
@@ -101,7 +102,10 @@ def entry(
 
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         kernel = f"{function.__module__}.{function.__name__}"
-        function.__qualname__ += f"_{checksum(sys.modules[__name__], memory, *uses):08x}"
+        scopes = (function.__globals__, *map(vars, uses))
+        calls = sorted({_linked[id(one)][0] for scope in scopes for one in scope.values() if id(one) in _linked})
+        state = crc32(" ".join(calls).encode(), checksum(sys.modules[__name__], memory, *uses))
+        function.__qualname__ += f"_{state:08x}"
         with _watch.over(kernel):
             try:
                 return numba.njit(types_, cache=True, **options)(function)
@@ -109,6 +113,10 @@ def entry(
                 return numba.njit(types_, **options)(function)
 
     return compiled
+
+
+#: Where what was linked stands -> its name, and itself, which stays where it is.
+_linked: dict[int, tuple[str, Any]] = {}
 
 
 def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
@@ -140,7 +148,9 @@ def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
 
     context = Parameter("typing_context", Parameter.POSITIONAL_OR_KEYWORD)
     call.__signature__ = Signature([context, *signature(function).parameters.values()])  # type: ignore[attr-defined]
-    return intrinsic(call)
+    made = intrinsic(call)
+    _linked[id(made)] = name, made
+    return made
 
 
 def checksum(*modules: ModuleType) -> int:

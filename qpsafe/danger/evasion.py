@@ -1,7 +1,8 @@
-"""Evasive motion, eqs. (8), (14)-(16): danger vectors as virtual forces on the links, through an admittance filter."""
+"""Evasive motion, eq. (16): virtual torque through an admittance filter, with friction where nobody comes."""
 
 from __future__ import annotations
 
+from math import copysign, inf
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -9,75 +10,20 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.compiled.compiled import Array, Vector, entry, inline, readable, row
+from qpsafe.compiled.compiled import entry, readable
+from qpsafe.danger.torque import link_vectors as link_vectors
+from qpsafe.danger.torque import virtual_torque as virtual_torque
 from qpsafe.errors import ConfigurationError
 from qpsafe.text.given import number, numbers, whole
 from qpsafe.text.words import call
 
 if TYPE_CHECKING:
+    from qpsafe.danger.activation import Threshold
     from qpsafe.robot.robot import Robot
-    from qpsafe.robot.state import RobotState
 
 
-def link_vectors(vectors: NDArray[np.float64], links: NDArray[np.int64], n_links: int) -> NDArray[np.float64]:
-    """Sum the danger vectors of each link's points, eq. (8).
-
-    Args:
-        vectors: Danger vectors (6), (p, 3), world frame.
-        links: Wire link that saw each point, (p,), in 0..n_links-1.
-        n_links: Number of wire links.
-
-    Returns:
-        One vector per link, (n_links, 3); zero where the link saw nothing.
-    """
-    total = np.zeros((n_links, 3))
-    _sum_by_link(vectors, links, total)
-    return total
-
-
-def virtual_torque(state: RobotState, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Virtual joint torque of the link vectors, each applied at both end frames of its link, eqs. (14), (15).
-
-    Only the linear rows of the Jacobians act, since the wrench has no moment. An end frame on the static base has a
-    zero Jacobian and adds nothing.
-
-    Args:
-        state: Robot at the measured joint position.
-        forces: One vector per wire link, (links, 3), world frame.
-
-    Returns:
-        σ, (n,).
-    """
-    starts, stops = state.robot.wire_indices
-    torque = np.zeros(len(state.q))
-    _torque(state.wire_jacobians(), starts, stops, forces, torque)
-    return torque
-
-
-_links = types.Array(types.int64, 1, "A", readonly=True)
-
-
-@entry(types.void(readable(2), _links, types.float64[:, ::1]))
-def _sum_by_link(vectors, links, total):  # type: ignore[no-untyped-def]
-    for k in range(len(links)):  # (8)
-        for c in range(3):
-            total[links[k], c] += vectors[k, c]
-
-
-@inline
-def act(force: Vector, J0: Array, J1: Array, torque: Array) -> None:
-    """Add the torque of a force at both ends of a link; J0, J1 (3, n) are their linear Jacobians."""
-    for c in range(3):
-        if force[c] != 0.0:
-            for j in range(torque.shape[0]):
-                # (14) W_i = [CDF_link_i; 0] at frames i-1 and i, (15) σ = Σ_i (J_(i-1) + J_i)ᵀ CDF_link_i
-                torque[j] += (J0[c, j] + J1[c, j]) * force[c]
-
-
-@entry(types.void(types.Array(types.float64, 3, "C", readonly=True), _links, _links, readable(2), types.float64[::1]))
-def _torque(J, starts, stops, forces, torque):  # type: ignore[no-untyped-def]
-    for i in range(len(starts)):
-        act(row(forces, i), J[starts[i]], J[stops[i]], torque)
+#: Who moves as fast as this, or faster, is evaded without friction [m/s].
+STANDING = 0.3
 
 
 @entry(types.void(readable(2), readable(2), readable(1), readable(1), types.float64[::1]))
@@ -89,6 +35,20 @@ def filter_by(A, B, before, sigma, after):  # type: ignore[no-untyped-def]
             after[i] += A[i, j] * before[j] + B[i, j] * sigma[j]
 
 
+@entry(types.void(types.float64[::1], readable(1), types.float64))
+def rub(velocity, drop, coming):  # type: ignore[no-untyped-def]
+    """Dry friction: take `drop` (n,) [rad/s] from the joints' speeds, less of it the faster somebody comes [m/s]."""
+    share = 1.0 - coming / STANDING
+    if share > 0.0:
+        for j in range(velocity.shape[0]):
+            if abs(velocity[j]) > share * drop[j]:
+                velocity[j] -= copysign(share * drop[j], velocity[j])
+            elif velocity[j] == velocity[j]:  # NaN stays, and is seen
+                velocity[j] = 0.0
+
+
+#: The rule's friction: which share of the danger Δ(1-ε) at one point moves no joint while nobody comes.
+RESTING = 0.5
 #: Virtual mass [N m s²/rad] and damping [N m s/rad] of every joint that were tuned on the first experiment.
 PAPER_MASS, PAPER_DAMPING = 4.0, 20.0
 #: The rule of `Evasion.for_robot`: shares of a joint's largest speed and of the time in which it gets there.
@@ -100,19 +60,26 @@ CONFIGURATIONS = 32  # that a robot's levers are looked for in
 
 
 class Evasion:
-    """Mass-damper admittance q̇0 = (M s + D)^-1 σ, eq. (16), sampled exactly for a held input.
+    """Mass-damper admittance q̇0 = (M s + D)^-1 σ, eq. (16), sampled exactly for a held input; with friction if wanted.
+
+    Friction is ours, not the paper's: M q̈0 + D q̇0 + c sgn(q̇0) = σ. An arm that creeps away from somebody who stands
+    gains no room, and what they do not see is touched while it moves; with friction it comes to rest. It counts in full
+    where nobody moves, not at all where somebody moves at `STANDING` or faster, or nobody knows how fast.
 
     Args:
         mass: M, scalar, (n,) diagonal or (n, n) symmetric positive definite.
         damping: D, likewise. D sets the steady speed D^-1 σ, D/M how fast it is reached.
         n: Number of joints.
         dt: Sample time [s].
+        friction: c, scalar or (n,), not negative [N m].
 
     Raises:
-        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, or dt <= 0.
+        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, a negative friction, or dt <= 0.
     """
 
-    def __init__(self, mass: ArrayLike, damping: ArrayLike, n: int, dt: float = 0.004) -> None:
+    def __init__(
+        self, mass: ArrayLike, damping: ArrayLike, n: int, dt: float = 0.004, friction: ArrayLike = 0.0
+    ) -> None:  # fmt: skip
         from scipy.linalg import expm
 
         self._dt = number("Evasion", "dt", dt, "a finite time > 0 [s]", above=0.0)
@@ -127,12 +94,15 @@ class Evasion:
                 self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
         if not (np.isfinite(rates).all() and np.isfinite(self._A).all() and np.isfinite(self._B).all()):
             raise ConfigurationError("Evasion", "damping", damping, "numbers that can be divided by those of mass")
-        for array in (self._mass, self._damping, self._A, self._B):
+        self._friction = _not_negative(friction, n, "friction")
+        self._drop = self._B.diagonal() * self._friction
+        for array in (self._mass, self._damping, self._A, self._B, self._friction, self._drop):
             array.flags.writeable = False
         self._velocity = np.zeros(n)
 
     def __repr__(self) -> str:
-        return call(self, mass=np.diag(self._mass), damping=np.diag(self._damping), dt=self._dt)
+        friction = {"friction": self._friction} if self._friction.any() else {}
+        return call(self, mass=np.diag(self._mass), damping=np.diag(self._damping), dt=self._dt, **friction)
 
     @classmethod
     def paper(cls, n: int, dt: float) -> Evasion:
@@ -146,7 +116,7 @@ class Evasion:
 
     @classmethod
     def for_robot(cls, robot: Robot, dt: float) -> Evasion:
-        """M and D that the robot's file states, else from its own limits and geometry; the default of a controller.
+        """M, D and friction that the robot's file states, else from its limits and geometry; a controller's default.
 
         Let ℓ_j be the longest lever of joint j, the largest |(J_(i-1) + J_i)_j| over links and configurations: a danger
         Δ at one point causes a torque of at most Δ ℓ_j there, see (14), (15). Then
@@ -166,6 +136,8 @@ class Evasion:
         it moves all links whole, but one way only. The others, of which the bundled robots have none, have the larger
         D_j = Δ ℓ_j/(s v_j) that they need, and M_j = D_j b v_j/a_j.
 
+        The friction of a joint is c_j = `RESTING` Δ ℓ_j: half that danger at one point at rest turns nothing.
+
         Stability: moving away reduces the force, K = -∂σ/∂q >= 0, and (M s + D) q̇0 = σ is passive for whatever positive
         M and D, also diagonal ones: a point at rest is evaded without a cycle whatever K is. A delay T takes phase from
         that: where the loop's gain K/(ω |M jω + D|) is 1, it needs ω T + atan(ω M/D) < π/2, with diagonal ones for the
@@ -179,15 +151,17 @@ class Evasion:
         """
         from qpsafe.danger.thresholds import robot_thresholds
 
+        high, lever = robot_thresholds(robot)[0], levers(robot)
+        friction = friction_of(robot, high)
         if robot.tuned.evasion is not None:
-            return cls(*robot.tuned.evasion, robot.nq, dt)
-        lever = levers(robot)
-        needed = robot_thresholds(robot)[0].start * lever / (SPEED_SHARE * robot.max_velocity)
+            M, D, c = robot.tuned.evasion
+            return cls(M, D, robot.nq, dt, friction if c is None else c)
+        needed = high.start * lever / (SPEED_SHARE * robot.max_velocity)
         speed = lever * robot.max_velocity * np.where(robot.sliding, 0.5, 1.0)
         common = needed <= SLOW * needed[int(np.argmax(speed))]
         damping = np.where(common, needed[common].max(), needed)
         mass = damping * TIME_SHARE * robot.max_velocity / robot.max_acceleration
-        return cls(mass, damping, robot.nq, dt)
+        return cls(mass, damping, robot.nq, dt, friction)
 
     @property
     def mass(self) -> NDArray[np.float64]:
@@ -198,6 +172,16 @@ class Evasion:
     def damping(self) -> NDArray[np.float64]:
         """D (n, n), read-only."""
         return self._damping
+
+    @property
+    def friction(self) -> NDArray[np.float64]:
+        """c (n,) [N m], read-only."""
+        return self._friction
+
+    @property
+    def drop(self) -> NDArray[np.float64]:
+        """What friction takes from the joints' speeds in a step where nobody comes (n,) [rad/s], read-only."""
+        return self._drop
 
     @property
     def dt(self) -> float:
@@ -213,14 +197,20 @@ class Evasion:
     def velocity(self, velocity: ArrayLike) -> None:
         self._velocity = self._vector("velocity", velocity)
 
-    def step(self, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
+    def step(self, sigma: NDArray[np.float64], coming: float = inf) -> NDArray[np.float64]:
         """Advance one sample under the virtual torque σ (n,) and return the evasive velocity q̇0 (n,) [rad/s].
 
+        Args:
+            sigma: σ [N m].
+            coming: How fast the fastest point moves that is seen [m/s]; infinite where that is not known: no friction.
+
         Raises:
-            ConfigurationError: σ is not n finite numbers.
+            ConfigurationError: σ is not n finite numbers, or coming is no speed.
         """
         velocity = np.empty(len(self._velocity))
-        filter_by(self._A, self._B, self._velocity, self._vector("sigma", sigma), velocity)
+        sigma, coming = self._vector("sigma", sigma), _speed(coming)
+        filter_by(self._A, self._B, self._velocity, sigma, velocity)
+        rub(velocity, self._drop, coming)
         self._velocity = velocity
         return velocity
 
@@ -247,6 +237,29 @@ class Evasion:
     def reset(self) -> None:
         """Forget the past: q̇0 = 0."""
         self._velocity = np.zeros_like(self._velocity)
+
+
+def _speed(value: float) -> float:
+    return value if value == inf else number("Evasion", "coming", value, "a speed >= 0 [m/s]", 0.0)
+
+
+def _not_negative(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:
+    """Scalar or (n,) as n checked numbers."""
+    expected = f"a number >= 0 [N m], or ({n},) of them"
+    array = numbers("Evasion", key, value, expected)
+    if array.shape not in ((), (1,), (n,)) or not (np.isfinite(array).all() and (array >= 0.0).all()):
+        raise ConfigurationError("Evasion", key, value, expected)
+    return np.array(np.broadcast_to(array, n), dtype=float)
+
+
+def friction_of(robot: Robot, high: Threshold) -> NDArray[np.float64]:
+    """The rule's friction c (n,) [N m], see `Evasion.for_robot`.
+
+    Args:
+        robot: The robot.
+        high: Where its most important task is released.
+    """
+    return RESTING * high.start * levers(robot)
 
 
 def levers(robot: Robot) -> NDArray[np.float64]:

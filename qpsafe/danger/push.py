@@ -8,13 +8,14 @@ import numpy as np
 from numba import types
 
 from qpsafe.compiled.compiled import Array, entry, readable
-from qpsafe.danger import evasion, vector
-from qpsafe.danger.evasion import act
+from qpsafe.danger import torque as torque_module
+from qpsafe.danger import vector
+from qpsafe.danger.torque import act
 from qpsafe.danger.vector import vector_of
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
 
-USES = (evasion, vector, kinematics)
+USES = (torque_module, vector, kinematics)
 _ints = types.Array(types.int64, 1, "A", readonly=True)
 _memory = types.Array(types.float64, 1, "C", readonly=True)
 

@@ -9,7 +9,7 @@ stage; the stages before it stay the compiled ones.
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -114,6 +114,9 @@ class Sense:
         )
         given["weights"] = (field.static, field.kinetic, field.gamma, field.floor) if ours else (nan,) * 4
         given["A"], given["B"] = evasion.matrices if ours else np.zeros((2, robot.nq, robot.nq))
+        sensors = [part.rules for part in (sensing,) if part] + [part.sensing for part in (ranging,) if part]
+        self._speeds = all(rules.velocities for rules in sensors)  # else nobody knows who comes: no friction
+        given["drop"] = evasion.drop if ours and self._speeds else np.zeros(robot.nq)
         counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]
         self._still = np.zeros(robot.nq)
         self._sizes = (robot.nq, robot.ends, len(starts), *counts, robot.memory)
@@ -182,7 +185,7 @@ class Sense:
         seen = Seen(
             points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, capped, *more[2:4]
         )
-        return self._ended(seen, self._work, count if sensing.rules.velocities else 0)
+        return self._ended(seen, self._work, count if sensing.rules.velocities else 0, self._speeds)
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
         if ages is not None:  # old points would count as seen now
@@ -204,7 +207,7 @@ class Sense:
         if self._ranging is not None:
             capped, notes = self._with(capped, notes, more)
         seen = Seen(points, links, danger, vectors, cdf_n, qd0, notes, capped, *more[2:4])
-        return self._ended(seen, work, p if len(more.points) else 0)
+        return self._ended(seen, work, p if len(more.points) else 0, self._speeds and not len(given))
 
     def _reduced(self, q: Array, qd: Array, given: Array) -> tuple[Array, tuple[str, ...]]:
         """The points of a cloud that count, and that it was reduced."""
@@ -243,19 +246,28 @@ class Sense:
         """q̇0 of the last tick (n,) [rad/s], where the compiled call needs it."""
         return self.parts[2].velocity if self._ours[1] else self._still
 
-    def _ended(self, seen: Seen, work: Array, moving: int) -> Seen:
-        """What is left to do: the stages of another making, and to remember q̇0."""
+    def _ended(self, seen: Seen, work: Array, moving: int, known: bool) -> Seen:
+        """What is left to do: the stages of another making, and to remember q̇0.
+
+        Args:
+            seen: By the compiled call.
+            work: In which it worked; it holds the points' velocities.
+            moving: How many of these.
+            known: Whether it is known how fast every point moves.
+        """
         _, field, evasion, _ = self.parts
         if not self._all_ours:
-            seen = self._asked(seen, field, evasion, work, moving)
+            seen = self._asked(seen, field, evasion, work, moving, known)
         elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
             raise BadInput(_NOT_FINITE)
         else:
             evasion.remember(seen.qd0)
         return seen
 
-    def _asked(self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int) -> Seen:
-        """Danger and q̇0 by a field and an evasion that are asked method by method."""
+    def _asked(
+        self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int, known: bool
+    ) -> Seen:  # fmt: skip
+        """Danger and q̇0 by a field and an evasion that are asked method by method; arguments as for `_ended`."""
         n, m, memory = len(seen.qd0), len(self._robot.wire_frames), self._robot.memory
         a = memory + 12 * m
         wire = Wire(*work[memory:a].reshape(4, m, 3).copy())
@@ -269,7 +281,10 @@ class Sense:
         )  # fmt: skip
         if not isfinite(cdf_n):
             raise BadInput(_NOT_FINITE)
-        qd0 = reals("the evasion's velocity", evasion.step(torque), torque.shape).copy()  # (16)
+        fastest = float(np.linalg.norm(velocities, axis=1).max()) if velocities is not None else 0.0
+        coming = fastest if known else inf
+        moved = evasion.step(torque, coming) if evasion.friction.any() else evasion.step(torque)  # (16)
+        qd0 = reals("the evasion's velocity", moved, torque.shape).copy()
         if not np.isfinite(qd0).all():
             raise ValueError(f"the evasion's velocity is not finite: {qd0}")
         return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)

@@ -1,7 +1,7 @@
 """The compiled stages of the first half of a tick, and the two calls they are composed to.
 
     q, q̇ --> kinematics, wire (4);   readings or points --(7), rules--> points that count
-    points --(1)-(6)--> danger vectors --(8), (14), (15)--> torque --(16)--> q̇0
+    points --(1)-(6)--> danger vectors --(8), (14), (15)--> torque --(16), friction--> q̇0
 
 What does not change from tick to tick stands in two blocks, one of floats and one of integers, see `Blocks`; a call
 with two arrays takes a tenth of the time of one with thirty. A field of another making is told by weights that are not
@@ -10,7 +10,7 @@ numbers: then the calls stop at the points.
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import inf, isfinite, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,10 @@ from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.compiled import compiled
-from qpsafe.compiled.compiled import Array, entry, inline, linked, readable
+from qpsafe.compiled.compiled import Array, entry, inline, linked, readable, row
 from qpsafe.compiled.memory import view
 from qpsafe.danger import link_field, push, speed
-from qpsafe.danger.evasion import filter_by
+from qpsafe.danger.evasion import filter_by, rub
 from qpsafe.danger.link_field import danger_field
 from qpsafe.danger.push import push_vectors
 from qpsafe.ranging import ranged
@@ -34,17 +34,17 @@ from qpsafe.sensing.detection import find_nearest
 from qpsafe.sensing.readings import take_readings
 
 # each is compiled once, for Python and for these calls
-_forward, _wire_of, _filter_by = linked(forward), linked(wire_of), linked(filter_by)
+_forward, _wire_of, _filter_by, _rub = linked(forward), linked(wire_of), linked(filter_by), linked(rub)
 _take_readings, _push_vectors = linked(take_readings, *readings.USES), linked(push_vectors, *push.USES)
 _find_nearest, _danger_field = linked(find_nearest, compiled), linked(danger_field, speed)
 
 # the block of integers begins with sizes, then tells where each field of the two blocks begins
 JOINTS, ENDS, LINKS, SPOTS, HULLS, FACES, MEMORY = range(7)
-FLOATS = ("plausible", "placements", "axes", "supports", "end_places", "A", "B", "weights", "numbers", "rays", "ranges",
-          "planes", "balls")  # fmt: skip
+FLOATS = ("plausible", "placements", "axes", "supports", "end_places", "A", "B", "drop", "weights", "numbers", "rays",
+          "ranges", "planes", "balls")  # fmt: skip
 INTEGERS = ("parents", "end_bodies", "starts", "stops", "bodies", "links", "hull_bodies", "first", "ticks")
-(PLAUSIBLE, PLACEMENTS, AXES, SUPPORTS, END_PLACES, A, B, WEIGHTS, NUMBERS, RAYS, RANGES, PLANES, BALLS,
- PARENTS, END_BODIES, STARTS, STOPS, BODIES, SPOT_LINKS, HULL_BODIES, FIRST, TICKS) = range(7, 7 + 22)  # fmt: skip
+(PLAUSIBLE, PLACEMENTS, AXES, SUPPORTS, END_PLACES, A, B, DROP, WEIGHTS, NUMBERS, RAYS, RANGES, PLANES, BALLS,
+ PARENTS, END_BODIES, STARTS, STOPS, BODIES, SPOT_LINKS, HULL_BODIES, FIRST, TICKS) = range(7, 7 + 23)  # fmt: skip
 _HEAD = 7 + len(FLOATS) + len(INTEGERS)
 
 
@@ -122,6 +122,20 @@ _stand = linked(stand, kinematics)
 
 
 @inline
+def _coming(own: int, velocities: Array, more: Array) -> float:
+    """How fast the fastest point moves [m/s], infinite where that is not known of one."""
+    if own > velocities.shape[0]:
+        return inf
+    most = 0.0
+    for p in range(own):
+        v = row(velocities, p)
+        most = max(most, v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    for p in range(more.shape[0]):
+        most = max(most, more[p, VELOCITY] ** 2 + more[p, VELOCITY + 1] ** 2 + more[p, VELOCITY + 2] ** 2)
+    return sqrt(most)
+
+
+@inline
 def _evade(
     f: Array, i: Index, work: Array, moving: int, more: Array, points: Array, links: Index, values: Array,
     vectors: Array, before: Array, qd0: Array,
@@ -155,6 +169,7 @@ def _evade(
     for j in range(n):
         if not isfinite(qd0[j]):
             cdf_n = nan
+    _rub(qd0, view(f, i[DROP], (n,)), _coming(own, view(work, a + n, (moving, 3)), more))
     return cdf_n
 
 

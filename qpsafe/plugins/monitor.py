@@ -200,7 +200,8 @@ class DangerMonitor:
         self.qd, self.points, self.danger = qd, points, danger
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
-        self.qd0 = self.evasion.step(torque).copy()  # (16)
+        coming = math.inf if len(points) else 0.0  # nobody says how fast points move
+        self.qd0 = self.evasion.step(torque, coming).copy()  # (16)
         self.box: Box | None = None if self._limits is None else self._limits.box(q, qd)
         self._within = (qd, qd) if self.box is None else (self.box.lower, self.box.upper)
         self.status, self.message = OK, message

@@ -49,7 +49,7 @@ class RecoveryRules:
     ramp: float = 0.2
     patience: float = 2.0
     calm: float = 0.8
-    dwell: float = 0.3
+    dwell: float = 0.1
     held: bool = True
     enabled: bool = True
 

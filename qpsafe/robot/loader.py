@@ -234,7 +234,8 @@ def _tuned(file: RobotFile, names: Sequence[str]) -> Tuned:
     order, evasion = [list(file.joints).index(name) for name in names], None
     if file.evasion is not None:
         mass, damping = (tuple([values[k] for k in order]) for values in (file.evasion.mass, file.evasion.damping))
-        evasion = mass, damping
+        friction = file.evasion.friction
+        evasion = mass, damping, None if friction is None else tuple([friction[k] for k in order])
     rad, m = file.units.radians, file.units.metres
     units = {"speed": m, "angular_speed": rad, "joint_speed": rad, "approach": m, "escape": m}
     tables = (file.recovery, file.sensing, file.gate)

@@ -33,7 +33,7 @@ def part_settings(experiment: Control) -> dict[str, Any]:
         "thresholds": None if activation is None else [[t.delta, t.epsilon] for t in activation.thresholds],
         "evasion": None
         if evasion is None
-        else {"mass": evasion.mass.tolist(), "damping": evasion.damping.tolist(), "dt": evasion.dt},
+        else {"dt": evasion.dt} | {key: getattr(evasion, key).tolist() for key in ("mass", "damping", "friction")},
     }
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from qpsafe.danger.activation import Activation, Threshold
-from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.evasion import Evasion, friction_of
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.recovery.returns import RecoveryRules
@@ -61,11 +61,17 @@ class Values:
         now = robot.tuned
         return {
             "activation": Activation((high,) * count + (low,) * count),
-            "evasion": Evasion(self.mass, self.damping, robot.nq, DT),
+            "evasion": self.evasion(robot),
             "recovery": RecoveryRules(**dict(now.recovery) | said["recovery"]),
             "sensing": SensingRules(**dict(now.sensing) | said["sensing"]),
             "gate": VerifiedMotion(**dict(now.gate) | said["gate"]),
         }
+
+    def evasion(self, robot: Robot) -> Evasion:
+        """M and D as they are here, friction as the robot's file has it, else by the rule for the thresholds here."""
+        stated = None if robot.tuned.evasion is None else robot.tuned.evasion[2]
+        friction = stated or friction_of(robot, Threshold(self.delta, self.epsilon))
+        return Evasion(self.mass, self.damping, robot.nq, DT, friction)
 
     def rounded(self) -> Values:
         """The same to four digits, Δ_f downwards, so that Table I stays possible: what is tried is what is written."""

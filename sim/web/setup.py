@@ -150,7 +150,7 @@ class Setup:
         if self.mass == self.damping == 1.0:
             return None
         own = _evasion(robot)
-        return Evasion(self.mass * own.mass, self.damping * own.damping, robot.nq, DT)
+        return Evasion(self.mass * own.mass, self.damping * own.damping, robot.nq, DT, own.friction)
 
     def _story(self, robot: Robot) -> Story:
         floor = -robot_stage(robot).pedestal

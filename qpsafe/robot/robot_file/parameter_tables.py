@@ -29,10 +29,11 @@ class DangerTable(Table):
 
 
 class EvasionTable(Table):
-    """M and D of eq. (16), one value a joint, in SI whatever the file's units: N m s²/rad and N m s/rad."""
+    """M and D of eq. (16), and friction, one value a joint, in SI whatever the file's units (N m s²/rad and so on)."""
 
     mass: Annotated[list[Positive], pydantic.Field(min_length=1)]
     damping: Annotated[list[Positive], pydantic.Field(min_length=1)]
+    friction: Annotated[list[NotNegative], pydantic.Field(min_length=1)] | None = None
 
 
 class RecoveryTable(Table):

@@ -224,7 +224,7 @@ def check(path: Path, file: RobotFile) -> None:
         expected = "delta_f (1 + epsilon_f) <= delta (1 - epsilon), or two levels of Table I overlap"
         raise RobotFileError(path, "danger.delta_f", danger.delta_f, expected)
     for key, values in () if file.evasion is None else sorted(file.evasion):
-        if len(values) != len(file.joints):
+        if values is not None and len(values) != len(file.joints):
             raise RobotFileError(path, f"evasion.{key}", values, f"{len(file.joints)} values, one a joint")
     for name in () if file.egm is None else file.egm.external:
         if name not in file.joints:

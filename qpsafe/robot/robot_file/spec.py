@@ -55,13 +55,13 @@ class Tuned(NamedTuple):
     """Parameters of a controller that a robot's file states, SI; empty where it leaves them to the defaults.
 
     Attributes:
-        evasion: M and D, both (n,).
+        evasion: M, D and friction, all (n,); None for the last where it is left to the rule.
         recovery: Of `RecoveryRules`.
         sensing: Of `SensingRules`.
         gate: Of `VerifiedMotion`.
     """
 
-    evasion: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    evasion: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...] | None] | None = None
     recovery: Stated = ()
     sensing: Stated = ()
     gate: Stated = ()

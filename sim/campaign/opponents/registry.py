@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike, NDArray
 
+from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.separation_limit import SeparationLimit
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
 from qpsafe.errors import ConfigurationError, in_words
@@ -34,6 +35,7 @@ from qpsafe.sim.campaign.opponents.fingerprint import fingerprint
 from qpsafe.sim.campaign.opponents.scaling import PathScaling
 from qpsafe.sim.campaign.opponents.separated import Separated
 from qpsafe.sim.campaign.opponents.stop import StopOnly
+from qpsafe.sim.campaign.trials.servo import DT
 
 if TYPE_CHECKING:
     from qpsafe.controller import SafetyController
@@ -96,6 +98,11 @@ def _capped(station: Station) -> SafetyController:
     return station.controller(barrier=DangerBarrier(9.5 / SOURCE[0].delta * high.delta), **AS_IN_PAPER)
 
 
+def _creeping(station: Station) -> SafetyController:
+    own = Evasion.for_robot(station.robot, DT)
+    return station.controller(evasion=Evasion(own.mass, own.damping, station.robot.nq, DT))
+
+
 def _apart(station: Station) -> SafetyController:
     return station.controller(HierarchicalLaw(), separation=SeparationLimit(station.separation), **AS_IN_PAPER)
 
@@ -115,6 +122,7 @@ _BUNDLED = (
     Opponent("unverified", "default without gate and rows for furniture", _with(gate="off", clearance="off")),
     Opponent("unheld", "default, but a link that cannot get away goes on",
              _with(gate=VerifiedMotion(escape=0.0))),
+    Opponent("creeping", "default, but its evasion has no friction", _creeping),
     Opponent("separation", "rows for v_max under the joint limits, no evasion, the path waits", Separated),
     Opponent("strict_separation", "strict, with rows for v_max above all tasks", _apart),
     Opponent("default", "SafetyController as it comes", _with()),

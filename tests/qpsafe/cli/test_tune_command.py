@@ -167,13 +167,20 @@ def test_with_one_trial_the_present_values_are_chosen_and_not_judged() -> None:
         (["--people", "nowhere.toml"], r"--people.*nowhere.toml"),
         (["--cell", "nowhere.toml"], r"--cell.*nowhere.toml"),
         (["--robot", "nobody"], r"nobody.*a bundled robot"),
-        (["--dask", "nonsense://x"], r"--dask.*nonsense"),
+        (["--dask", "nonsense://x", "--workers", "2"], r"--workers.*only without --dask"),
     ],
 )
 def test_what_is_wrong_is_named(arguments: list[str], named: str) -> None:
     result = tune(*FEW, *arguments)
     assert isinstance(result.exception, ValueError), result.output
     assert re.search(named, str(result.exception))
+
+
+def test_an_address_of_workers_that_is_none_is_named() -> None:
+    few = [argument for argument in FEW if argument not in ("--workers", "1")]
+    result = tune(*few, "--dask", "nonsense://x")
+    assert isinstance(result.exception, ValueError), result.output
+    assert re.search(r"--dask.*nonsense", str(result.exception))
 
 
 def test_without_optuna_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from amounts import first, some
 import qpsafe
 from qpsafe.sensing.detection import nearest_link
 
-PLAIN = qpsafe.SensingRules(hold_time=0.0, self_detection=False)
+PLAIN = qpsafe.SensingRules(hold_time=0.0, self_detection=False, velocities=False)  # points tell none
 LAWS = {
     "strict": qpsafe.HierarchicalLaw,
     "paper": lambda: qpsafe.HierarchicalLaw("paper"),

@@ -64,7 +64,8 @@ def test_what_images_show_is_as_dangerous_as_the_field_says(run: Any, eyes: Any,
     """What counts comes with its danger and gradient: those of (5) there, and pushed by (6), (8), (14), (15)."""
     place = eyes.looking((0.2, 0.0, 0.6), (1.6, 0.3, 0.9))
     sensor, rng = RangeSensor.array("array", pose=place), np.random.default_rng(7)
-    loop, told = run(**({} if spots else {"spots": "off"}), range_sensors=[sensor]), []
+    evasion = qpsafe.Evasion(1.0, 10.0, 6)  # friction has tests of its own
+    loop, told = run(**({} if spots else {"spots": "off"}), range_sensors=[sensor], evasion=evasion), []
     update = RangeSensing.update
     monkeypatch.setattr(RangeSensing, "update", lambda *given: told.append(update(*given)) or told[-1])
     field, robot, moving = qpsafe.DangerField(), loop.controller.robot, 0
