@@ -17,6 +17,8 @@ sys.path.append(str(ROOT / "docs"))
 
 from noted import note  # noqa: E402
 
+#: Speeds between those of the fast person's table [m/s].
+BETWEEN = " ".join(f"--speed {0.55 + 0.1 * k:.2f}" for k in range(15))
 #: What is run; {out} stands for a file or folder that is not kept. A program of benchmarks/ writes the JSON there.
 COMMANDS = {
     "fixed": "demo fixed --json --no-video --out {out}",
@@ -27,6 +29,7 @@ COMMANDS = {
     "path": "demo path --json --out {out}",
     "fast-person": "demo fast-person --json --out {out}",
     "fast-person-sharp": "demo fast-person --sensor sharp --json --out {out}",
+    "fast-person-between": f"demo fast-person --experiment path {BETWEEN} --json --out {{out}}",
     "pick": "demo pick-and-place --seeds 10 --jobs 1 --json --out {out}",
     "compare": "compare --full --json",
     "place": "place --no-caps --json --no-pictures --out {out}",

@@ -61,6 +61,8 @@ def fast_person() -> list[str]:
     (touched,) = (run for run in sharp if run["contact"] is not None)
     assert touched["speed"] == 2.5
     assert touched["towards_speed"] < 0.0
+    between = measured("fast-person-between")
+    speeds, hit = [run["speed"] for run in between], sum(run["contact"] is not None for run in between)
     nearest = {f"{1e3 * run['distance']:.0f}" for run in runs if run["speed"] == 2.0}
     assert len(nearest) == 1, "at 2.0 m/s the walker is nearest to the base plate in each experiment"
     return [
@@ -69,6 +71,8 @@ def fast_person() -> list[str]:
         f"links that move stay {1e3 * late:.0f} mm away",
         f"while it goes away at {-touched['towards_speed']:.2f} m/s",
         "All fifteen runs",
+        f"of {len(speeds)} speeds between these, {min(speeds):.2f} to {max(speeds):.2f} m/s, the robot",
+        f"touched at {hit} (`python docs/data_commands.py fast-person-between`)",
     ]
 
 
