@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 
-#: Who moves as fast as this, or faster, is evaded without friction [m/s].
+#: Where a point is known to move as fast as this, or faster, there is no friction [m/s].
 STANDING = 0.3
 
 
@@ -63,8 +63,9 @@ class Evasion:
     """Mass-damper admittance q̇0 = (M s + D)^-1 σ, eq. (16), sampled exactly for a held input; with friction if wanted.
 
     Friction is ours, not the paper's: M q̈0 + D q̇0 + c sgn(q̇0) = σ. An arm that creeps away from somebody who stands
-    gains no room, and what they do not see is touched while it moves; with friction it comes to rest. It counts in full
-    where nobody moves, not at all where somebody moves at `STANDING` or faster, or nobody knows how fast.
+    gains little room, and who is not seen touches it while it moves; with friction it comes to rest. It counts in full
+    where no point moves, not at all where one does at `STANDING` or faster, or nobody knows how fast. Spots know how
+    fast a point comes nearer along their ray, nothing of who walks across it.
 
     Args:
         mass: M, scalar, (n,) diagonal or (n, n) symmetric positive definite.

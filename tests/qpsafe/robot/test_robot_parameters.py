@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import qpsafe
-from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.evasion import Evasion, friction_of
 from qpsafe.danger.thresholds import SOURCE, robot_thresholds
 from qpsafe.errors import ConfigurationError, RobotFileError
 from qpsafe.gate.rules import VerifiedMotion
 
+EVASION = "[evasion]\nmass = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\ndamping = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n"
 TABLES = """
 [evasion]
 mass = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
@@ -107,9 +108,26 @@ def test_joints_in_another_order_have_their_own_values(folder: Path) -> None:
     assert controller(qpsafe.load_robot(folder)).evasion.mass.diagonal().tolist() == [2.0, 1.0, 3.0, 4.0, 5.0, 6.0]
 
 
+def test_friction_is_that_of_the_file_in_its_order_or_that_of_the_rule(folder: Path) -> None:
+    """None is a friction, too; what is left out follows the thresholds that the file states."""
+    file = folder / "robot.toml"
+    text = file.read_text(encoding="utf-8")
+    robot = qpsafe.load_robot(folder)
+    np.testing.assert_array_equal(controller(robot).evasion.friction, friction_of(robot, qpsafe.Threshold(12.5, 0.15)))
+    for stated in ([0.5, 1.0, 0.0, 2.0, 3.0, 4.0], [0.0] * 6):
+        file.write_text(text.replace("[evasion]\n", f"[evasion]\nfriction = {stated}\n"), encoding="utf-8")
+        made = controller(qpsafe.load_robot(folder)).evasion
+        assert made.friction.tolist() == stated
+        assert made.mass.diagonal().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    paper = controller(qpsafe.load_robot(folder), evasion="paper")
+    assert not paper.evasion.friction.any()
+
+
 @pytest.mark.parametrize(
     ("tables", "named"),
     [
+        (EVASION + "friction = [1.0]\n", r"evasion.friction.*6 values"),
+        (EVASION + "friction = [1.0, 1.0, 1.0, 1.0, 1.0, -1.0]\n", r"evasion.friction"),
         ("[evasion]\nmass = [1.0]\ndamping = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n", r"evasion.mass.*6 values"),
         ("[evasion]\nmass = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n", r"evasion.damping.*missing"),
         ("[recovery]\ncalm = 1.5\n", r"recovery.calm.*1.5"),
