@@ -172,6 +172,8 @@ def farewell(run: Irc5Loop, exchange: UdpExchange, lockstep: bool = False, cycle
         cycles: How many.
     """
     run.irc5.program(False)
+    if run.irc5.counts.answered == 0:  # there is nobody to tell
+        return
     with suppress(NoAnswerError):
         for _ in range(cycles):
             if not lockstep:

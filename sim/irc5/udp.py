@@ -5,7 +5,7 @@ from __future__ import annotations
 import select
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -26,6 +26,7 @@ from qpsafe.irc5.transport.axes import Axes, axes_of
 from qpsafe.sim.irc5.link import NO_FAULTS, Wire, WireFaults
 
 Array = NDArray[np.float64]
+_AGAIN = 0.5  # [s]; how soon what nobody has answered yet is sent again
 
 
 class NoAnswerError(QpsafeError, RuntimeError):
@@ -44,7 +45,9 @@ class UdpExchange:
         seed: Draws when.
         lockstep: Wait this long for the answer to every packet [s]; 0: do not wait.
         event_port: Where names of events are taken, on loopback; 0 for any port.
-        patience: In lock-step, how long to wait for the very first answer [s].
+        patience: In lock-step, how long to wait for the very first answer [s]; what is sent is repeated meanwhile,
+            since the other end may not be there yet.
+        over: Asked while waiting in lock-step: whether to wait no longer.
 
     Attributes:
         events: Address at which names of events are taken.
@@ -63,6 +66,7 @@ class UdpExchange:
         lockstep: float = 0.0,
         event_port: int = 0,
         patience: float = 60.0,
+        over: Callable[[], bool] = lambda: False,
     ) -> None:
         if not 0.0 <= strangers <= 1.0:
             raise ConfigurationError("UdpExchange", "strangers", strangers, "0 to 1")
@@ -81,7 +85,7 @@ class UdpExchange:
         self.events: tuple[str, int] = self._events.getsockname()
         self._rng = np.random.default_rng((seed, 7))
         self.out, self.back = (Wire(faults, np.random.default_rng((seed, k))) for k in range(2))
-        self._lockstep, self._patience = lockstep, patience
+        self._lockstep, self._patience, self._over = lockstep, patience, over
         self.rejected = 0
 
     def aim(self, stream: tuple[str, int], sensors: tuple[str, int] | None) -> None:
@@ -112,17 +116,17 @@ class UdpExchange:
             NoAnswerError: In lock-step, there was none in time.
         """
         came = [] if self._lockstep else self._arrived()
-        if self._sensors is not None:
-            self._sensors.send(distances)
+        self._sense(distances)
         if packet is not None:
             self.out.put(encode_robot(packet, self._axes))
             if self._rng.random() < self.strangers:
                 other = RobotPacket(packet.seq + 1, packet.time_ms, packet.q + 0.5, clock=packet.clock)
                 self._send(self._stranger, encode_robot(other, self._axes))
-        for data in self.out.take():
+        sent = self.out.take()
+        for data in sent:
             self._send(self._socket, data)
         if self._lockstep and packet is not None:
-            came = self._wait()
+            came = self._wait(sent, distances)
         answers = []
         for data in came:
             try:
@@ -140,15 +144,24 @@ class UdpExchange:
             self.back.put(data)
         return self.back.take()
 
-    def _wait(self) -> list[bytes]:
-        """The answer to the packet just sent, through a good wire."""
-        end = time.monotonic() + max(self._lockstep, self._patience)
-        while time.monotonic() < end:
+    def _sense(self, distances: Array) -> None:
+        if self._sensors is not None:
+            self._sensors.send(distances)
+
+    def _wait(self, sent: list[bytes], distances: Array) -> list[bytes]:
+        """The answer to the packets just sent, through a good wire; none where it is over."""
+        start = again = time.monotonic()
+        while (now := time.monotonic()) < start + max(self._lockstep, self._patience):
             select.select([self._socket], [], [], 0.1)
             came = _drain(self._socket)
-            if came:
-                self._patience = 0.0
+            if came or self._over():
+                self._patience = self._patience if not came else 0.0
                 return came
+            if self._patience and now >= again + _AGAIN:  # a datagram to a port that nobody has opened yet is lost
+                again = now
+                self._sense(distances)
+                for data in sent:
+                    self._send(self._socket, data)
         raise NoAnswerError("no answer in lock-step: is qpsafe stream running, and not leaving?")
 
     def _names(self) -> list[str]:

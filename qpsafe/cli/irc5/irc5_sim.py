@@ -132,13 +132,16 @@ def irc5_sim(
     found = load_named(ready_name(WHERE, robot, screen, 6, sensors=True), screen)
     loop, period = experiment_loop(experiment.value, found, seed=seed, sensor=sensor.value)
     length = period if duration is None else duration
+    requests = Requests()
     exchange = UdpExchange(
         axes_of_robot(found),
         (address, port),
         (address, sensor_port) if sensor_port else None,
         event_port=event_port,
         seed=seed,
-        lockstep=1.0 if lockstep else 0.0,
+        lockstep=10.0 if lockstep else 0.0,  # who waits for the other keeps no real time
+        patience=180.0,  # the other end may still have to compile
+        over=lambda: bool(requests.leave),
     )
     again = None if experiment is Experiment.pick_and_place else period  # screws that were delivered stay there
     run = Irc5Loop(loop, exchange, settings, again)
@@ -146,7 +149,7 @@ def irc5_sim(
         screen.print(realtime.fifo(70).line, style="dim")
     realtime.fine_timers()
     realtime.freeze_garbage()
-    with Requests().heard() as requests, closing(exchange):
+    with requests.heard(), closing(exchange):
         screen.print(f"sending to {host}:{port}; Ctrl-C ends")
         result = run_robot(
             run,
