@@ -108,9 +108,9 @@ def run_campaign(
         MissingExtraError: pyarrow is not installed, and there is a folder.
     """
     begun = perf_counter()
-    play = partial(play_trials, trial or _engine(), plan)
     if out is not None:
-        require("campaign", "a folder of trials", "pyarrow")  # before one is made
+        require("campaign", "a folder of trials", "pyarrow")  # before one is made, or the engine compiled
+    play = partial(play_trials, trial or _engine(), plan)
     with alone_in(out), _stored(out, plan) as store:
         finished = set() if store is None else store.trials() & set(range(plan.trials))
         parts: list[Played] = []

@@ -221,8 +221,11 @@ def test_without_pyarrow_it_runs_in_memory_and_a_folder_names_the_extra(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     same(run().columns, straight)
+    asked: list[None] = []
+    monkeypatch.setattr("qpsafe.sim.campaign.runner._engine", lambda: asked.append(None))
     with pytest.raises(MissingExtraError, match=r"qpsafe\[campaign\]"):
-        run(out=tmp_path / "new")
+        run_campaign(PLAN, tmp_path / "new")
+    assert not asked  # nobody waits for an engine that will not be used
     assert not (tmp_path / "new").exists()
 
 
