@@ -26,6 +26,7 @@ from qpsafe.pipeline.checks import (
     check_tasks,
     checked_activation,
     checked_dt,
+    checked_evasion,
     checked_field,
     checked_law,
     checked_recovery,
@@ -120,14 +121,13 @@ class SafetyController(Running):
         self._law = HierarchicalLaw() if law is None else checked_law(law)
         self._field = DangerField() if field is None else checked_field(field)
         self._activation = checked_activation(self._tasks, activation, robot)
-        self.evasion = evasion
+        self._evasion = checked_evasion(evasion, robot, self._dt)  # its own since `reset`
         self.limits = limits
         self._set_sensors(spots, sensing, range_sensors, ranging, known, carried)
         self.barrier, self.gate, self.separation = barrier, gate, separation
         self.clearance = "off" if self._limits is None and clearance is None else clearance
-        self._recovery_rules = (
-            RecoveryRules(**dict(robot.tuned.recovery)) if recovery is None else checked_recovery(recovery)
-        )
+        stated = dict(robot.tuned.recovery)
+        self._recovery_rules = RecoveryRules(**stated) if recovery is None else checked_recovery(recovery)
         self._gentle = GentleLimits(self._recovery_rules.acceleration)
         self._stages = Stages(robot, self._dt, self._known, self._carried, self._rules.max_age)
         self._stages.sense(self._sensing, self._field, self._evasion, self._ranging)

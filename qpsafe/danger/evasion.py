@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from math import copysign, inf
-from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.compiled.compiled import entry, readable
+from qpsafe.danger.levers import levers
 from qpsafe.danger.torque import link_vectors as link_vectors
 from qpsafe.danger.torque import virtual_torque as virtual_torque
 from qpsafe.errors import ConfigurationError
@@ -56,7 +56,6 @@ SPEED_SHARE, TIME_SHARE = 0.5, 0.3
 #: How many times the damping of the joint that moves the wire fastest a joint may need and still share one D with it.
 SLOW = 2.0
 MOST_JOINTS = 1000  # a robot can have; beyond it matrices do not fit anywhere
-CONFIGURATIONS = 32  # that a robot's levers are looked for in
 
 
 class Evasion:
@@ -64,18 +63,19 @@ class Evasion:
 
     Friction is ours, not the paper's: M q̈0 + D q̇0 + c sgn(q̇0) = σ. An arm that creeps away from somebody who stands
     gains little room, and who is not seen touches it while it moves; with friction it comes to rest. It counts in full
-    where no point moves, not at all where one does at `STANDING` or faster, or nobody knows how fast. Spots know how
-    fast a point comes nearer along their ray, nothing of who walks across it.
+    where no point comes nearer, not at all where one does at `STANDING` or faster, or nobody knows how fast. Who passes
+    by counts by the part of the velocity that comes nearer; what is held without being seen counts as standing.
 
     Args:
         mass: M, scalar, (n,) diagonal or (n, n) symmetric positive definite.
         damping: D, likewise. D sets the steady speed D^-1 σ, D/M how fast it is reached.
         n: Number of joints.
         dt: Sample time [s].
-        friction: c, scalar or (n,), not negative [N m].
+        friction: c, scalar or (n,), not negative [N m]; 0 where M or D is not diagonal.
 
     Raises:
-        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, a negative friction, or dt <= 0.
+        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, a negative friction or one
+            beside matrices that couple joints, or dt <= 0.
     """
 
     def __init__(
@@ -87,19 +87,33 @@ class Evasion:
         n = whole("Evasion", "n", n, "a whole number of joints, at least 1", 1, MOST_JOINTS)
         self._mass = _positive_definite(mass, n, "mass")
         self._damping = _positive_definite(damping, n, "damping")
+        self._friction = _not_negative(friction, n, "friction")
         # zero-order hold: q̇0 <- A q̇0 + (I - A) D^-1 σ,  A = expm(-M^-1 D dt)
         with np.errstate(over="ignore", invalid="ignore"):
             rates = np.linalg.solve(self._mass, self._damping) * self._dt
             if np.isfinite(rates).all():
                 self._A = expm(-rates)
                 self._B = np.linalg.solve(self._damping.T, (np.eye(n) - self._A).T).T
+                self._drop = self._B.diagonal() * self._friction
         if not (np.isfinite(rates).all() and np.isfinite(self._A).all() and np.isfinite(self._B).all()):
             raise ConfigurationError("Evasion", "damping", damping, "numbers that can be divided by those of mass")
-        self._friction = _not_negative(friction, n, "friction")
-        self._drop = self._B.diagonal() * self._friction
+        coupled = any(np.count_nonzero(matrix) > n for matrix in (self._mass, self._damping))
+        if coupled and self._friction.any():  # an impulse at one joint would move the others
+            raise ConfigurationError("Evasion", "friction", friction, "0 where mass or damping is not diagonal")
+        if not np.isfinite(self._drop).all():
+            raise ConfigurationError("Evasion", "friction", friction, "numbers that can be divided by those of damping")
+        self._velocity = np.zeros(n)
+        self.__setstate__({})
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy is nobody's yet."""
+        return {key: value for key, value in self.__dict__.items() if key != "_owner"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Unpickled and copied arrays can be written to again."""
+        self.__dict__.update(state)
         for array in (self._mass, self._damping, self._A, self._B, self._friction, self._drop):
             array.flags.writeable = False
-        self._velocity = np.zeros(n)
 
     def __repr__(self) -> str:
         friction = {"friction": self._friction} if self._friction.any() else {}
@@ -203,7 +217,7 @@ class Evasion:
 
         Args:
             sigma: σ [N m].
-            coming: How fast the fastest point moves that is seen [m/s]; infinite where that is not known: no friction.
+            coming: How fast the fastest point comes nearer [m/s]; infinite where that is not known: no friction.
 
         Raises:
             ConfigurationError: σ is not n finite numbers, or coming is no speed.
@@ -240,6 +254,16 @@ class Evasion:
         self._velocity = np.zeros_like(self._velocity)
 
 
+def evade(evasion: Evasion, sigma: NDArray[np.float64], coming: float) -> NDArray[np.float64]:
+    """One step of an evasion that is asked; of one without friction, whose `step` may know nothing of who comes.
+
+    Args:
+        evasion: Any, maybe of a derived class.
+        sigma, coming: See `Evasion.step`.
+    """
+    return evasion.step(sigma, coming) if evasion.friction.any() else evasion.step(sigma)
+
+
 def _speed(value: float) -> float:
     return value if value == inf else number("Evasion", "coming", value, "a speed >= 0 [m/s]", 0.0)
 
@@ -261,28 +285,6 @@ def friction_of(robot: Robot, high: Threshold) -> NDArray[np.float64]:
         high: Where its most important task is released.
     """
     return RESTING * high.start * levers(robot)
-
-
-def levers(robot: Robot) -> NDArray[np.float64]:
-    """The longest lever of every joint, from both ends of a link (n,) [m]: how much torque a danger causes at most.
-
-    It is looked for at home and in some configurations of the joints' whole range, once a robot.
-    """
-    if robot in _levers:
-        return _levers[robot]
-    starts, stops = robot.wire_indices
-    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-    drawn = np.random.default_rng(0).uniform(lower, upper, (CONFIGURATIONS, robot.nq))
-    longest = np.zeros(robot.nq)
-    for q in (robot.home, *drawn):
-        J = robot.at(q).wire_jacobians()
-        longest = np.maximum(longest, np.linalg.norm(J[starts] + J[stops], axis=1).max(axis=0))  # (15)
-    longest.flags.writeable = False
-    _levers[robot] = longest
-    return longest
-
-
-_levers: WeakKeyDictionary[Robot, NDArray[np.float64]] = WeakKeyDictionary()
 
 
 def _positive_definite(value: ArrayLike, n: int, key: str) -> NDArray[np.float64]:

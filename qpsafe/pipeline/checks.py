@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from inspect import signature
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary, ref
+from weakref import ref
 
 import numpy as np
 from numba import types
@@ -148,10 +149,18 @@ def checked_evasion(evasion: Evasion | str | None, robot: Robot, dt: float, wher
         raise ConfigurationError(where, "evasion", evasion, expected)
     if evasion.dt != dt:
         raise ConfigurationError(where, "evasion.dt", evasion.dt, f"the tick, dt = {dt} s")
+    if evasion.friction.any() and not _takes_coming(evasion):
+        expected = "step(sigma, coming) where there is friction; friction=0 for none"
+        raise ConfigurationError(where, "evasion.step", type(evasion).__name__, expected)
     return evasion
 
 
-_users: WeakKeyDictionary[Evasion, ref[Any]] = WeakKeyDictionary()  # who remembers motion in which evasion
+def _takes_coming(evasion: Evasion) -> bool:
+    try:
+        signature(evasion.step).bind(evasion.velocity, 0.0)
+    except (TypeError, ValueError):  # not so, or nobody knows
+        return False
+    return True
 
 
 def own_evasion(user: Any, evasion: Evasion) -> Evasion:
@@ -164,11 +173,11 @@ def own_evasion(user: Any, evasion: Evasion) -> Evasion:
     Raises:
         ConfigurationError: It is the `evasion` of another user, who is still there.
     """
-    other = _users.get(evasion, lambda: None)()
+    other = evasion.__dict__.get("_owner", lambda: None)()
     if other is not None and other is not user and getattr(other, "evasion", None) is evasion:
         expected = f"one of its own: another {type(other).__name__} has it"
         raise ConfigurationError(type(user).__name__, "evasion", evasion, expected)
-    _users[evasion] = ref(user)
+    evasion._owner = ref(user)  # type: ignore[attr-defined]
     return evasion
 
 

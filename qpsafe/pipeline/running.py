@@ -9,6 +9,7 @@ import numpy as np
 
 from qpsafe.danger.activation import Activation, Switching
 from qpsafe.errors import QpsafeError
+from qpsafe.pipeline.checks import own_evasion
 from qpsafe.pipeline.parts import Parts
 from qpsafe.recovery.recovery import Recovery
 from qpsafe.recovery.stall import StallWatch
@@ -41,6 +42,10 @@ class Running(Parts):
         """A copy is in no tick, also one that a part of the controller makes within a tick."""
         return {**self.__dict__, "_at_work": False}
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        own_evasion(self, self._evasion)
+
     def _switching(self, cdf_n: float) -> Switching:
         """Switches (19), (21), activations and regime; of a class of the user's, checked.
 
@@ -58,7 +63,7 @@ class Running(Parts):
     def reset(self) -> None:
         """Start anew: the next valid measurement sets the commanded configuration."""
         self._recovery = Recovery(self._tasks, self._activation.suspend_above, self._dt, self._recovery_rules)
-        self._evasion.reset()
+        own_evasion(self, self._evasion).reset()
         self._reset_sensors()
         rules = self._recovery_rules
         self._stall = StallWatch(self._robot, self._dt, rules.tolerance, rules.patience)

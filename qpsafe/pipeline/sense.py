@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qpsafe.danger.evasion import Evasion
+from qpsafe.danger.evasion import Evasion, evade
 from qpsafe.danger.field import DangerField
 from qpsafe.danger.push import push_vectors
 from qpsafe.gate.gated import NO_AGES
@@ -116,6 +116,10 @@ class Sense:
         given["A"], given["B"] = evasion.matrices if ours else np.zeros((2, robot.nq, robot.nq))
         sensors = [part.rules for part in (sensing,) if part] + [part.sensing for part in (ranging,) if part]
         self._speeds = all(rules.velocities for rules in sensors)  # else nobody knows who comes: no friction
+        if (
+            ranging is not None
+        ):  # nor where images are not tracked, or a field of another making is shown points at rest
+            self._speeds = self._speeds and ranging.rules.predict and self._ours[0]
         given["drop"] = evasion.drop if ours and self._speeds else np.zeros(robot.nq)
         counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]
         self._still = np.zeros(robot.nq)
@@ -283,8 +287,7 @@ class Sense:
             raise BadInput(_NOT_FINITE)
         fastest = float(np.linalg.norm(velocities, axis=1).max()) if velocities is not None else 0.0
         coming = fastest if known else inf
-        moved = evasion.step(torque, coming) if evasion.friction.any() else evasion.step(torque)  # (16)
-        qd0 = reals("the evasion's velocity", moved, torque.shape).copy()
+        qd0 = reals("the evasion's velocity", evade(evasion, torque, coming), torque.shape).copy()  # (16)
         if not np.isfinite(qd0).all():
             raise ValueError(f"the evasion's velocity is not finite: {qd0}")
         return seen._replace(danger=danger, vectors=vectors, cdf_n=cdf_n, qd0=qd0)

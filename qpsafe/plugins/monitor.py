@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from contextlib import suppress
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.activation import Activation
-from qpsafe.danger.evasion import Evasion, link_vectors, virtual_torque
+from qpsafe.danger.evasion import Evasion, evade, link_vectors, virtual_torque
 from qpsafe.danger.field import DangerField, danger_vectors
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.errors import ConfigurationError
@@ -86,7 +87,8 @@ class DangerMonitor:
         self._count = 0  # of switches; 0 until they are known
         self.ramp, self.field = ramp, DangerField() if field is None else field
         self.activation = Activation(robot_thresholds(robot)) if activation is None else activation
-        self.evasion, self.limits = evasion, limits
+        self._evasion = checked_evasion(evasion, self._robot, self._dt, "DangerMonitor")  # its own since `reset`
+        self.limits = limits
         self._within = (np.zeros(robot.nq),) * 2  # lowest and highest velocity that it may have been sent last
         self.reset()
 
@@ -150,9 +152,18 @@ class DangerMonitor:
     def limits(self, limits: JointLimits | str | None) -> None:
         self._limits = checked_limits("DangerMonitor", limits, self._robot, self._dt)
 
+    def __copy__(self) -> Self:
+        """One of its own that goes on from here; parts that do not change are shared."""
+        return copy.deepcopy(self, {id(part): part for part in (self._robot, self._field, self._activation)})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy has an evasion of its own."""
+        self.__dict__.update(state)
+        own_evasion(self, self._evasion)
+
     def reset(self) -> None:
         """Forget what was near: no points, no evasive velocity. From its last velocity the robot has to brake still."""
-        self._evasion.reset()
+        own_evasion(self, self._evasion).reset()
         self.ticks, within = 0, self._within
         self._bad("not updated yet")
         self._within = within
@@ -201,7 +212,7 @@ class DangerMonitor:
         self.cdf_n = float(danger.max(initial=0.0))
         self.switches = self._ramped(self.activation.switches(self.cdf_n))  # (19), (21)
         coming = math.inf if len(points) else 0.0  # nobody says how fast points move
-        self.qd0 = self.evasion.step(torque, coming).copy()  # (16)
+        self.qd0 = evade(self.evasion, torque, coming).copy()  # (16)
         self.box: Box | None = None if self._limits is None else self._limits.box(q, qd)
         self._within = (qd, qd) if self.box is None else (self.box.lower, self.box.upper)
         self.status, self.message = OK, message

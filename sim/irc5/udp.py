@@ -126,14 +126,18 @@ class UdpExchange:
         for data in sent:
             self._send(self._socket, data)
         if self._lockstep and packet is not None:
-            came = self._wait(sent, distances)
+            return self._wait(sent, distances), self._names()
+        return self._decoded(came), self._names()
+
+    def _decoded(self, came: list[bytes]) -> list[SensorPacket]:
+        """The answers among what has come; the rest is counted."""
         answers = []
         for data in came:
             try:
                 answers.append(decode_sensor(data, self._axes))
             except MalformedPacket:
                 self.rejected += 1
-        return answers, self._names()
+        return answers
 
     def _send(self, sender: socket.socket, data: bytes) -> None:
         with suppress(OSError):  # nobody there yet
@@ -148,15 +152,15 @@ class UdpExchange:
         if self._sensors is not None:
             self._sensors.send(distances)
 
-    def _wait(self, sent: list[bytes], distances: Array) -> list[bytes]:
+    def _wait(self, sent: list[bytes], distances: Array) -> list[SensorPacket]:
         """The answer to the packets just sent, through a good wire; none where it is over."""
         start = again = time.monotonic()
         while (now := time.monotonic()) < start + max(self._lockstep, self._patience):
             select.select([self._socket], [], [], 0.1)
-            came = _drain(self._socket)
-            if came or self._over():
-                self._patience = self._patience if not came else 0.0
-                return came
+            answers = self._decoded(_drain(self._socket))
+            if answers or self._over():
+                self._patience = 0.0 if answers else self._patience
+                return answers
             if self._patience and now >= again + _AGAIN:  # a datagram to a port that nobody has opened yet is lost
                 again = now
                 self._sense(distances)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.danger.evasion import levers
+from qpsafe.danger.levers import levers
 from qpsafe.sim.tuning.values import Values, present
 
 if TYPE_CHECKING:

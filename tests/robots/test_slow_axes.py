@@ -11,7 +11,8 @@ from amounts import some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from qpsafe.danger.evasion import SPEED_SHARE, TIME_SHARE, Evasion, levers
+from qpsafe.danger.evasion import SPEED_SHARE, TIME_SHARE, Evasion
+from qpsafe.danger.levers import levers
 from qpsafe.danger.thresholds import robot_thresholds
 from qpsafe.robot.loader import load_quietly
 from qpsafe.robot.robot import Robot

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from qpsafe.cli.main import app
 from qpsafe.errors import QpsafeError
-from qpsafe.irc5.messages import RobotPacket, decode_sensor, encode_robot
+from qpsafe.irc5.messages import RobotPacket, SensorPacket, encode_robot
 from qpsafe.irc5.records.log import read_references
 from qpsafe.robot.loader import load_robot
 from qpsafe.sim.experiments.by_name import experiment_loop
@@ -156,12 +156,12 @@ def test_whatever_ends_the_stream_the_last_answers_are_a_pose_at_rest(end: str, 
     do, code, words = ENDS[end]
     robot = load_robot("irb140")
     options = ["--no-sensors", "--watchdog", "5", "--experiment", "path", "--log", str(tmp_path / "run.qpref")]
-    answers: list[bytes] = []
+    answers: list[SensorPacket] = []
     with stream_process(*options) as stream:
         exchange = UdpExchange(robot.nq, stream.addresses["the robot"], lockstep=5.0)
         receive = exchange._wait
 
-        def kept(*sent: Any) -> list[bytes]:
+        def kept(*sent: Any) -> list[SensorPacket]:
             came = receive(*sent)
             answers.extend(came)
             return came
@@ -174,7 +174,7 @@ def test_whatever_ends_the_stream_the_last_answers_are_a_pose_at_rest(end: str, 
         with pytest.raises(NoAnswerError):
             _go(run, 3000)
         exchange.close()
-    found = [decode_sensor(data, 6) for data in answers]
+    found = answers
     assert (found[-1].qd_ref == 0.0).all()
     assert (found[-1].q_ref == found[-40].q_ref).all()  # the pose at rest was sent for a while
     changes = np.abs(np.diff([answer.qd_ref for answer in found], axis=0))

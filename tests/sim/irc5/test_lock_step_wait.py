@@ -67,6 +67,26 @@ def test_the_first_packet_reaches_one_that_begins_later(after: float) -> None:
     other.sensors.close()
 
 
+def test_what_is_no_answer_ends_no_wait() -> None:
+    """Garbage before the first answer is counted, and the patience for that stays."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        exchange = UdpExchange(6, other.getsockname(), lockstep=0.05, patience=30.0)
+
+        def answer() -> None:
+            _, sender = other.recvfrom(4096)
+            other.sendto(b"garbage", sender)
+            time.sleep(0.4)
+            other.sendto(encode_sensor(SensorPacket(0, 0, PACKET.q, np.zeros(6)), AXES), sender)
+
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        answers, _ = exchange.swap(PACKET, np.zeros(0))
+        thread.join(30.0)
+        assert (len(answers), exchange.rejected) == (1, 1)
+        exchange.close()
+
+
 def test_who_is_no_longer_wanted_does_not_wait() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
         silent.bind(("127.0.0.1", 0))
