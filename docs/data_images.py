@@ -4,7 +4,7 @@ qpsafe campaign run --controllers default --seed 6000000 --sensor vl53l5cx --tri
 
 Of folders in which `unheld` has run as well, docs/data/judged-standing.json says what standing links change, and where
 `creeping` has, judged-friction.json what friction does; of those with ideal or Sharp sensors, judged-ideal.json and
-judged-sharp.json say what came of the default. What is known of other sensors stays.
+judged-sharp.json say what came of the default. What is known of other sensors stays, and of more encounters as well.
 
 python docs/data_images.py FOLDER...
 """
@@ -34,6 +34,8 @@ def main() -> None:
             less = [row for row in report["comparisons"] if (row["controller"], row["reference"]) == (other, "default")]
             both = {name: report["controllers"][name] for name in (other, "default")}
             beside[other][default["sensor"]] = {"controllers": both, "comparisons": less}
+        if default["trials"] < found.get(default["sensor"], default)["trials"]:
+            continue
         if default["sensor"] in ("ideal", "sharp"):
             own = {"controllers": {"default": default}, "comparisons": [], "references": ["default"]}
             note(f"judged-{default['sensor']}", report | own | {"worst": {"default": report["worst"]["default"]}})
@@ -42,7 +44,7 @@ def main() -> None:
     note("judged-images", found)
     for other, name in BESIDE.items():
         if beside[other]:
-            note(name, beside[other])
+            note(name, measured(name) | beside[other])
 
 
 if __name__ == "__main__":

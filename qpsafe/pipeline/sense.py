@@ -116,9 +116,7 @@ class Sense:
         given["A"], given["B"] = evasion.matrices if ours else np.zeros((2, robot.nq, robot.nq))
         sensors = [part.rules for part in (sensing,) if part] + [part.sensing for part in (ranging,) if part]
         self._speeds = all(rules.velocities for rules in sensors)  # else nobody knows who comes: no friction
-        if (
-            ranging is not None
-        ):  # nor where images are not tracked, or a field of another making is shown points at rest
+        if ranging is not None:  # nor where images are not tracked, or a user's field is shown them at rest
             self._speeds = self._speeds and ranging.rules.predict and self._ours[0]
         given["drop"] = evasion.drop if ours and self._speeds else np.zeros(robot.nq)
         counts = [len(tables.get(key, ())) for key in ("bodies", "balls", "planes")]

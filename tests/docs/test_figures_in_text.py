@@ -188,7 +188,7 @@ def tune_foreign(bundled: dict[str, Any]) -> list[str]:
     assert mine / of < theirs / all_of
     return [
         f"touched in {mine} of {of} encounters, {100 * mine / of:.1f} %",
-        f"what it ships in {theirs} of {all_of:,}, {100 * theirs / all_of:.1f} %",
+        f"what it shipped then in {theirs} of {all_of:,}, {100 * theirs / all_of:.1f} %",
         f"gain {gains['before']} mm before, {gains['after']} mm after",
     ]
 
