@@ -37,7 +37,7 @@ def replay(
     """Run the controller again on a run's recorded inputs and compare every answer with the recorded one, bit by bit.
 
     Exit code 0 if all are the same, 1 at the first bit that differs: which tick, which answer, by how much, and which
-    versions or robot files have changed since.
+    versions, code or robot files have changed since.
     """
     screen = console(json)
     if web:

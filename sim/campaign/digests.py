@@ -1,4 +1,4 @@
-"""Digests of what decides a trial's rows: files, a robot, the code; and whether files are still what was read of them.
+"""Digests of what decides a trial's rows: files, a robot; and whether files are still what was read of them.
 
 What is made of files once a process is kept by their `State`, which costs no reading: a file that was edited between
 two campaigns of a notebook is read again.
@@ -8,36 +8,20 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-import qpsafe
-import qpsafe.robots
-import qpsafe.sim
-import qpsafe.tasks
 from qpsafe.robot.loader import bundled_robots, find_robot, load_quietly
 from qpsafe.robot.models.urdf_check import package_folders
 from qpsafe.robot.robot import Robot
+from qpsafe.sim.recording.digest import files_digest
 from qpsafe.text.words import file_word
 
 #: Of files: path, and what changes when they are written; None where there is none.
 State = tuple[tuple[str, tuple[int, ...] | None], ...]
 #: Letters of a name in a file's.
 _LONGEST = 100
-#: Endings of what decides, and folders of what only shows.
-_CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", "report", "limit", "plugins", "irc5"}
-
-
-@cache
-def code_digest() -> str:
-    """64 hexadecimal digits that stand for the code and the models that decide a trial's rows."""
-    packages = (qpsafe, qpsafe.tasks, qpsafe.robots, qpsafe.sim)
-    folders = [Path(path) for package in packages for path in package.__path__]
-    files = [(path.relative_to(folder), path) for folder in folders for path in files_in(folder)]
-    deciding = [path for name, path in sorted(files) if path.suffix in _CODE and not _OUTPUT & set(name.parts)]
-    return files_digest(deciding)
 
 
 def robot_digest(name: str) -> str:
@@ -49,19 +33,6 @@ def robot_digest(name: str) -> str:
     found = hashlib.sha256(files_digest(sorted(_own_files(name, robot))).encode())
     for body, shape, vertices in robot.hulls():
         found.update(f"{body} {shape}".encode() + vertices.tobytes())
-    return found.hexdigest()
-
-
-def files_in(path: Path) -> list[Path]:
-    """All files of a folder and below, in order; a file itself."""
-    return sorted(item for item in path.rglob("*") if item.is_file()) if path.is_dir() else [path]
-
-
-def files_digest(files: Sequence[Path]) -> str:
-    """64 hexadecimal digits that stand for the contents of files, in their order."""
-    found = hashlib.sha256()
-    for file in files:
-        found.update(hashlib.sha256(file.read_bytes()).digest())
     return found.hexdigest()
 
 

@@ -21,9 +21,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import bundled_robots, find_robot
-from qpsafe.sim.campaign.digests import code_digest, files_digest, files_in, robot_digest
+from qpsafe.sim.campaign.digests import robot_digest
 from qpsafe.sim.campaign.trials.servo import DT
 from qpsafe.sim.ranging.sets import sensor_kinds
+from qpsafe.sim.recording.digest import code_digest, files_digest, files_in
 from qpsafe.text.json_text import json_text
 from qpsafe.text.toml_text import TomlText
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.errors import QpsafeError
+from qpsafe.sim.recording.digest import code_digest
 from qpsafe.sim.recording.log import RunLog
 from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.scene import Scene
@@ -37,6 +38,8 @@ INPUTS = ("q", "qd", "distances")
 OUTPUTS = ("q_ref", "qd_ref", "cdf_n", "m", "f", "regime", "phase", "status")
 #: Packages whose arithmetic decides the last bits.
 PACKAGES = ("qpsafe", "numpy", "scipy", "numba", "pin", "mujoco", "daqp", "ruckig")
+#: Between two versions the code changes, too.
+CODE = "code of qpsafe"
 FPS = 25
 #: Begins fingerprints of a robot; older ones, of all that lay in its folder and of nothing else, cannot be compared.
 PRINT = "sha256:"
@@ -101,14 +104,14 @@ class RunFile:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages whose arithmetic decides the last bits."""
+    """Versions of Python and of the packages whose arithmetic decides the last bits, and of the code itself."""
     found = {"python": ".".join(map(str, sys.version_info[:3]))}
     for name in PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
-    return found
+    return found | {CODE: code_digest()[:12]}
 
 
 def fingerprint(robot: Robot) -> str:

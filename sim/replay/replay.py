@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from qpsafe.sim.recording.run_file import PRINT, RunFile, RunFileError, fingerprint, versions
+from qpsafe.sim.recording.run_file import CODE, PRINT, RunFile, RunFileError, fingerprint, versions
 from qpsafe.sim.replay.settings import Experiment, experiment_of, loop_of
 from qpsafe.tick import Tick
 
@@ -113,6 +113,8 @@ def changed(run: RunFile, experiment: Experiment) -> tuple[str, ...]:
         for name, was in run.header["versions"].items()
         if now.get(name) != was
     ]
+    if CODE not in run.header["versions"]:
+        found.append(f"the {CODE} was not noted then")
     was = run.header["robot_files"]
     if was.startswith(PRINT) and was != fingerprint(experiment.robot):
         found.append(f"the files of robot {experiment.robot.name} have changed")

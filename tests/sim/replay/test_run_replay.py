@@ -25,6 +25,7 @@ from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 from qpsafe.sim.experiments.pick_place.settings import PEOPLE
 from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.recording.run_file import (
+    CODE,
     INPUTS,
     OUTPUTS,
     PRINT,
@@ -160,6 +161,12 @@ def test_every_file_that_decides_is_named_wherever_it_lies_and_no_other(tmp_path
     assert said() == ()
     older = replace(run, header={**run.header, "robot_files": 64 * "0"})
     assert changed(older, experiment) == ()
+    noted = run.header["versions"]
+    for versions, words in (
+        ({**noted, CODE: "0" * 12}, f"{CODE} {'0' * 12} then, {noted[CODE]} now"),
+        ({name: was for name, was in noted.items() if name != CODE}, f"the {CODE} was not noted then"),
+    ):
+        assert changed(replace(run, header={**run.header, "versions": versions}), experiment) == (words,)
 
 
 def test_recorded_states_are_those_of_the_run(recorded, run: RunFile) -> None:
