@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 import qpsafe
 import qpsafe.robots
@@ -19,11 +20,22 @@ _CODE, _OUTPUT = {".py", ".toml", ".xml", ".urdf"}, {"cli", "bench", "drawing", 
 @cache
 def code_digest() -> str:
     """64 hexadecimal digits that stand for the code and the models that decide a run, or a trial's rows."""
-    packages = (qpsafe, qpsafe.tasks, qpsafe.robots, qpsafe.sim)
-    folders = [Path(path) for package in packages for path in package.__path__]
-    files = [(path.relative_to(folder), path) for folder in folders for path in files_in(folder)]
-    deciding = [path for name, path in sorted(files) if path.suffix in _CODE and not _OUTPUT & set(name.parts)]
-    return files_digest(deciding)
+    return files_digest(deciding((qpsafe, qpsafe.tasks, qpsafe.robots, qpsafe.sim)))
+
+
+def deciding(packages: Sequence[ModuleType]) -> list[Path]:
+    """Files that decide, each once and in the order of its name in Python: a clone and a wheel have the same ones.
+
+    Args:
+        packages: In a wheel some lie within others.
+    """
+    named = {
+        Path(*package.__name__.split("."), file.relative_to(folder)): file
+        for package in packages
+        for folder in map(Path, package.__path__)
+        for file in files_in(folder)
+    }
+    return [named[name] for name in sorted(named) if name.suffix in _CODE and not _OUTPUT & set(name.parts)]
 
 
 def files_in(path: Path) -> list[Path]:
