@@ -9,7 +9,7 @@ SHARED := -n 2 --dist loadfile --no-loadscope-reorder
 # tests start dozens of Pythons: each would compile every source again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo web test test-web test-slow dev lint docs figures bench dist clean
+.PHONY: demo web test test-long test-web test-slow dev lint docs figures bench dist clean
 
 demo: $(VENV)/.demo ## the paper's first experiment: table, figure, csv, video
 	$(BIN)/qpsafe demo fixed --out $(OUT)
@@ -18,7 +18,10 @@ web: $(VENV)/.web ## a robot among people, in the browser
 	$(BIN)/qpsafe web --open
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest $(SHARED) -m "not slow and not web"
+	$(BIN)/python -m pytest $(SHARED) -m "not slow and not long and not web"
+
+test-long: $(VENV)/.dev ## whole experiments, commands from start to end, processes that die: what `make test` leaves out for its length
+	$(BIN)/python -m pytest $(SHARED) -m "long and not slow and not web"
 
 test-web: $(VENV)/.browser ## the page in a real browser: Chromium, where it is installed
 	$(BIN)/python -m pytest -m web -p no:xdist tests/sim/web

@@ -161,6 +161,7 @@ def test_the_loop_runs_without_any_extra(tmp_path: Path) -> None:
     assert set(map(tuple, found.values())) == {("ok", True)}  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("present", "asked"), first(1, [("", BARE), ("sim", WITH_SIM)]))
 def test_what_is_missing_is_named_by_its_extra(present: str, asked: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text("<mujoco/>")

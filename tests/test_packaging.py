@@ -217,6 +217,7 @@ def test_an_unpacked_sdist_is_a_whole_source_tree(tmp_path: Path) -> None:
     assert set(listed.stdout.splitlines()) - names == set()
 
 
+@pytest.mark.long
 def test_the_wheel_has_every_module_and_leaks_no_other_name(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name for name in names if name.endswith(".py")} == set(modules())

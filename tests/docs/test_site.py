@@ -85,6 +85,7 @@ def test_nothing_else_is_markup() -> None:
     assert marked("|e|² and 2*x and n_ of them", []) == r"\|e\|² and 2\*x and n\_ of them"
 
 
+@pytest.mark.long
 def test_equations_stay_as_they_are() -> None:
     text = ["With", "", "    |q̇| <= a*b", "", "it holds for `x`.", "", "Args:", "    x: Of |x|."]
     assert converted(text, []) == [

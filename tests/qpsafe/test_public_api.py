@@ -53,6 +53,7 @@ def test_an_error_can_be_caught_without_the_rest() -> None:
     assert {"numpy", "mujoco"}.isdisjoint(fresh(code))
 
 
+@pytest.mark.long
 def test_the_controller_imports_no_simulation() -> None:
     """Arrows point one way: neither MuJoCo nor a plot is needed to control a robot."""
     code = (

@@ -17,6 +17,8 @@ from qpsafe.tasks.program import Program
 from qpsafe.tasks.rotation import exp3
 from qpsafe.tasks.trajectory import Sample
 
+pytestmark = pytest.mark.long
+
 
 def fixed_tasks(robot: Any, count: int = 2) -> list[Any]:
     """Position, then orientation, of every tool."""

@@ -20,6 +20,8 @@ from qpsafe.sim.campaign.plan import CONTROLLERS, QUICK, Plan
 from qpsafe.sim.campaign.runner import stored_results
 from qpsafe.sim.campaign.speed import Speed
 
+pytestmark = pytest.mark.long
+
 Campaign = Callable[..., Any]
 
 #: No number of a trial, nor a case.

@@ -17,6 +17,8 @@ from qpsafe.sim.campaign.limit.search import EVALUATIONS
 from qpsafe.sim.campaign.plan import Plan
 from qpsafe.sim.campaign.worst.cases import Encounter
 
+pytestmark = pytest.mark.long
+
 Campaign = Callable[..., Any]
 
 

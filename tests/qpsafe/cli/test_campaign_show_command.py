@@ -19,6 +19,8 @@ from qpsafe.sim.campaign.report.page import show_command
 from qpsafe.sim.campaign.worst.cases import Encounter, cases_to_dict, encounter_of, find_worst, load_case
 from qpsafe.text.json_text import json_text
 
+pytestmark = pytest.mark.long
+
 Campaign = Callable[..., Any]
 
 

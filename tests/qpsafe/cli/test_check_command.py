@@ -18,6 +18,8 @@ from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.cell_file import load_cell
 from qpsafe.tasks.program_file import load_program
 
+pytestmark = pytest.mark.long
+
 run = CliRunner().invoke
 PROGRAM = """
 frame = "tcp"

@@ -44,6 +44,7 @@ def test_wrong_usage_is_refused_before_anything_runs(arguments: list[str]) -> No
     assert result.exit_code == 2
 
 
+@pytest.mark.long
 def test_demo_writes_report_figures_and_signals(tmp_path: Path) -> None:
     result = run(app, ["demo", "fixed", "--duration", "0.4", "--no-video", "--json", "--out", str(tmp_path / "new")])
     assert result.exit_code == 0, result.output

@@ -29,6 +29,7 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", first(1, STORIES), ids=lambda path: path.name)
 def test_bundled_stories_are_sound_and_drawn(path: Path, tmp_path: Path) -> None:
     code, text = run("story", str(path), "--json", "--plot", str(tmp_path / "plan.png"))

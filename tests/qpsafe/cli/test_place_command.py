@@ -23,6 +23,8 @@ from qpsafe.placement import candidates
 from qpsafe.placement.sensors import Sensor
 from qpsafe.robot.robot import Robot
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(autouse=True)
 def _nodes_found_once(monkeypatch: pytest.MonkeyPatch) -> None:

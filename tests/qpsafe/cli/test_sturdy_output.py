@@ -20,6 +20,8 @@ from qpsafe.errors import ConfigurationError
 from qpsafe.robot.loader import load_robot
 from qpsafe.sensing.sharp import SharpCurve
 
+pytestmark = pytest.mark.long
+
 
 def run(*words: object) -> Any:
     return CliRunner().invoke(main.app, [*map(str, words)])

@@ -24,6 +24,8 @@ from qpsafe.sim.tuning.robot_file import MARK, farthest
 from qpsafe.sim.tuning.space import Space
 from qpsafe.sim.tuning.values import present
 
+pytestmark = pytest.mark.long
+
 FEW = ["--trials", "17", "--workers", "1", "--judge", "24", "--finals", "30"]
 
 

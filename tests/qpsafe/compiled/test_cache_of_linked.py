@@ -52,6 +52,7 @@ def answer(folder: Path, x: float) -> float:
     return float(done.stdout)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", first(1, reversed(FORMS)))
 def test_a_changed_callee_is_the_one_that_is_called(tmp_path: Path, form: str) -> None:
     """It was an abort of the process: the cached caller asked for the name of a callee that is not there any more."""

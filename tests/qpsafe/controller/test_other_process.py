@@ -13,6 +13,8 @@ from amounts import first
 
 import qpsafe
 
+pytestmark = pytest.mark.long
+
 WAYS: dict[str, Any] = {
     "deepcopy": copy.deepcopy,
     "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),

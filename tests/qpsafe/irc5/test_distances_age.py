@@ -57,6 +57,7 @@ SILENCES = st.sampled_from([0.0, 0.001, 0.01, 0.03]) | st.floats(0.0, 0.1)
 BACKLOGS = st.sampled_from([1, 2, 10, FAR_TOO_MANY])
 
 
+@pytest.mark.long
 @settings(max_examples=some(15, of=200), deadline=None)
 @given(
     st.lists(st.tuples(BACKLOGS, SILENCES, st.sampled_from([None, 0.0, 0.05]), st.booleans()), min_size=1, max_size=6)

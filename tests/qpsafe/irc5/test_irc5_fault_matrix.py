@@ -19,6 +19,8 @@ from qpsafe.sim.irc5.bench import Workbench
 from qpsafe.sim.irc5.fault_cases import CASES
 from qpsafe.sim.irc5.fault_matrix import run_faults
 
+pytestmark = pytest.mark.long
+
 QUICK = (
     "junk after every packet",
     "motors off for 0.4 s",

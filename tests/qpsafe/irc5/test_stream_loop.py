@@ -16,6 +16,8 @@ from qpsafe.irc5.supervisor import State, StopCategory
 from qpsafe.sim.irc5.controller import IdealBody, SimulatedIrc5
 from qpsafe.sim.irc5.in_process import ROBOT_ADDRESS, Here
 
+pytestmark = pytest.mark.long
+
 FREE = np.full(20, np.inf)
 
 

@@ -11,6 +11,8 @@ import pytest
 from qpsafe.errors import ConfigurationError
 from qpsafe.irc5.process.watchdog import Watchdog
 
+pytestmark = pytest.mark.long
+
 
 def until(condition, seconds: float = 30.0) -> bool:
     end = time.monotonic() + seconds

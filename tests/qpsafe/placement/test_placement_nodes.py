@@ -21,6 +21,8 @@ from qpsafe.placement.spots_toml import spots_toml
 from qpsafe.placement.surface import link_surface, model_body
 from qpsafe.robot.robot import Robot
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 
 

@@ -18,6 +18,8 @@ from qpsafe.laws.problem import LawProblem, TaskVelocity
 from qpsafe.plugins.convert import task_velocity
 from qpsafe.plugins.monitor import DangerMonitor
 
+pytestmark = pytest.mark.long
+
 
 def test_the_weighted_law_and_solve_ik_agree_on_the_same_tasks_costs_and_limits(engine, robot):
     active = 0

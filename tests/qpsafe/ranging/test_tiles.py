@@ -103,6 +103,7 @@ def test_a_pixel_alone_in_a_camera_is_noise(
     assert (distances == read.max()).all()
 
 
+@pytest.mark.long
 @quick
 @given(sensors(), st.integers(64, 400))
 def test_every_pixel_lies_in_the_cone_of_a_tile_and_layers_stay_apart(sensor: RangeSensor, dense: int) -> None:

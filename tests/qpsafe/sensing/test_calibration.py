@@ -35,6 +35,7 @@ def test_exact_pairs_give_the_curve_back(curve: SharpCurve) -> None:
     assert fit.curve.distance(curve.voltage(d)) == pytest.approx(d, abs=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", first(1, range(3)))
 def test_noisy_simulated_sensors_are_read_within_1_cm(seed: int) -> None:
     """The issue's promise: 20 units, each identified from 13 noisy pairs, then 20-80 cm read with 95 % within 1 cm."""
@@ -163,6 +164,7 @@ def folder(irb140: Any, tmp_path: Path) -> Path:
     return copy
 
 
+@pytest.mark.long
 def test_the_command_writes_what_the_robot_loads(irb140: Any, folder: Path, tmp_path: Path) -> None:
     names = qpsafe.load_spots(irb140).names
     csv = pairs_csv(tmp_path / "pairs.csv", names, header="note,voltage,spot,distance")

@@ -28,6 +28,8 @@ from qpsafe.sim.campaign.runner import Results, run_campaign
 from qpsafe.sim.campaign.trials.rows import COLUMNS, of_controller
 from qpsafe.text.json_text import json_text
 
+pytestmark = pytest.mark.long
+
 PLAN = Plan(trials=60, seed=5)
 FLAT = (
     "trials", "contacts", "moving", "towards", "furniture", "self", "distance_median", "distance_p10", "lost_time_mean",

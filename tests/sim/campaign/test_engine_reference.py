@@ -28,6 +28,7 @@ def test_dynamics_move_the_robot_a_little_otherwise() -> None:
     assert found["contact"] == found["contact_there"]
 
 
+@pytest.mark.long
 def test_the_engine_is_timed_beside_mujoco() -> None:
     speed = engine_speed(Plan(motions=("hold",)), trials=1, mujoco=True)
     assert speed.engine >= speed.planned > 0.0

@@ -25,6 +25,8 @@ from qpsafe.sim.campaign.trials.meeting import meeting
 from qpsafe.sim.campaign.trials.rows import columns_of
 from qpsafe.sim.campaign.trials.trial import recorded
 
+pytestmark = pytest.mark.long
+
 HERE = Path(environment.__file__).resolve()
 
 

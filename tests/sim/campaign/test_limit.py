@@ -204,6 +204,7 @@ def test_no_point_of_anybody_moves_farther_than_the_steps(rng: np.random.Generat
     assert steps[-1] == 0.0
 
 
+@pytest.mark.long
 def test_what_touches_furniture_is_worse_than_any_contact(plan: Plan) -> None:
     """And a motion into the table is no candidate for the limit."""
     escape = escape_of(plan, 1, 10)

@@ -24,6 +24,8 @@ from qpsafe.sim.engine.tracks import PersonTracks
 from qpsafe.sim.experiments.fast_person import at_speed
 from qpsafe.tick import FAULT
 
+pytestmark = pytest.mark.long
+
 TICKS = 1100  # somebody who walks at 1.6 m/s is there by then
 
 

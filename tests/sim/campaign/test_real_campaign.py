@@ -16,6 +16,8 @@ from qpsafe.sim.campaign.report.summary import summary
 from qpsafe.sim.campaign.runner import Results, run_campaign
 from qpsafe.sim.campaign.trials.rows import of_controller
 
+pytestmark = pytest.mark.long
+
 TRIALS = some(3, of=6)  # of each motion as many
 CONTROLLERS = ("none", "stop_perfect_sight", "default")
 ATTACKING = f"{Path(__file__)}:attacking"

@@ -15,6 +15,8 @@ from qpsafe.sim.drawing.render import Camera, VideoWriter
 from qpsafe.sim.people.choreography import Choreography
 from qpsafe.sim.world.scene import build_scene
 
+pytestmark = pytest.mark.long
+
 needs_gl = pytest.mark.usefixtures("opengl")
 
 

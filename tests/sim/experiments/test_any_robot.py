@@ -32,6 +32,8 @@ from qpsafe.sim.world.scene import build_scene
 from qpsafe.sim.world.tool_axis import tool_axis
 from qpsafe.tasks.program_file import parse_program
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module", params=["SEVEN", pytest.param("SIX", marks=pytest.mark.slow)])
 def ready(request: pytest.FixtureRequest, arms: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:

@@ -19,6 +19,8 @@ from qpsafe.sim.experiments.shared import skin
 from qpsafe.sim.experiments.shared.by_hand import MARK, by_hand, marked, unmarked, write_marked
 from qpsafe.sim.experiments.shared.ready import Ready, made_ready
 
+pytestmark = pytest.mark.long
+
 
 @hypothesis_settings(max_examples=some(20, of=200), deadline=None)
 @given(st.text(), st.integers(0), st.sampled_from(["", "#", "x", "\n", "é", "\r"]))

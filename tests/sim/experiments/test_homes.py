@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from amounts import some
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -14,6 +15,8 @@ from qpsafe.robot.robot import Robot
 from qpsafe.sim.experiments.shared.home import Arm, Touching, chosen_home, quality
 from qpsafe.sim.experiments.shared.ready import choices
 from qpsafe.sim.world.tool_axis import tool_axis
+
+pytestmark = pytest.mark.long
 
 #: Axis, range [rad] and length of the link [m] of six joints.
 AXES = (

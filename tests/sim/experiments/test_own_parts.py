@@ -19,6 +19,8 @@ from qpsafe.sim.experiments.path.experiment import PathExperiment
 from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
 from qpsafe.sim.replay.settings import controller_of, experiment_of, settings_of
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 EXPERIMENTS: dict[str, Callable[..., Any]] = {
     "fixed": lambda **own: FixedExperiment(ROBOT, duration=0.1, **own),

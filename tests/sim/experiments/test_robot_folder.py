@@ -26,6 +26,8 @@ from qpsafe.sim.tuning.robot_file import farthest, write_folder
 from qpsafe.sim.tuning.space import Space
 from qpsafe.sim.tuning.values import present
 
+pytestmark = pytest.mark.long
+
 MESHES = ("link.stl", "../meshes/link.stl", "package://made_up_support/meshes/link.stl")
 
 

@@ -20,6 +20,8 @@ from qpsafe.sim.world.plant import Plant
 from qpsafe.sim.world.robot_spec import torques
 from qpsafe.sim.world.scene import build_scene
 
+pytestmark = pytest.mark.long
+
 AGAIN = [HealthCheck.function_scoped_fixture]
 
 

@@ -85,6 +85,7 @@ def test_a_host_is_looked_up_once_and_not_in_the_loop(nowhere: list[str]) -> Non
     exchange.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("count", "expected"), first(1, [(2, [2]), (1, [])]))
 def test_there_are_never_more_processes_than_moments(
     count: int, expected: list[int], monkeypatch: pytest.MonkeyPatch

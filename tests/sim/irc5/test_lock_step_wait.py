@@ -18,6 +18,8 @@ from qpsafe.irc5.messages import RobotPacket, SensorPacket, decode_robot, encode
 from qpsafe.irc5.transport.axes import axes_of
 from qpsafe.sim.irc5.udp import NoAnswerError, UdpExchange
 
+pytestmark = pytest.mark.long
+
 AXES = axes_of(6)
 PACKET = RobotPacket(7, 100, np.linspace(-1.0, 1.0, 6), clock=0.1)
 

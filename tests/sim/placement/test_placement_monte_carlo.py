@@ -25,6 +25,8 @@ from qpsafe.sim.placement.dummy import DRAWS, RADII, dummies
 from qpsafe.sim.placement.run import MonteCarlo
 from qpsafe.sim.placement.world import PlacementWorld
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 
 

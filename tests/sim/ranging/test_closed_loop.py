@@ -15,6 +15,8 @@ from qpsafe.sim.replay.replay import replay
 from qpsafe.sim.replay.settings import settings_of
 from qpsafe.sim.stories.file import parse_story
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 WALK = """
 [[person]]

@@ -15,6 +15,8 @@ from qpsafe.sim.experiments.fixed.experiment import FixedExperiment, euler_error
 from qpsafe.sim.recording.log import RunLog, intervals
 from qpsafe.tasks.rotation import exp3
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 
 

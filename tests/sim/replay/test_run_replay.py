@@ -42,6 +42,8 @@ from qpsafe.sim.replay.stage import Stage
 from qpsafe.sim.stories.file import parse_story
 from qpsafe.sim.world.distance import TrueDistances
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 NEAR = """
 [[person]]

@@ -18,6 +18,8 @@ from qpsafe.sim.people.choreography import Approach, Choreography
 from qpsafe.sim.sick.cases import CASES
 from qpsafe.sim.sick.matrix import Result, run_matrix
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 BRIEF = Choreography(
     approaches=(Approach(math.radians(0.0), 0.0, 1.02, 0.72, medium_pause=0.2, close_pause=0.2),),

@@ -27,6 +27,8 @@ from qpsafe.sim.tuning.search import APART, JUDGE, MOST, SEARCH, Rungs, Search, 
 from qpsafe.sim.tuning.sensitivity import sensitivity
 from qpsafe.sim.tuning.trial import Trial, front_of
 
+pytestmark = pytest.mark.long
+
 SEARCHED = Search(Plan(), 3, Rungs((6, 18, 36), lagged=3))
 BATCHES = 4
 TRIALS = 1 + BATCHES * BATCH

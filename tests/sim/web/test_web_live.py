@@ -25,6 +25,8 @@ from qpsafe.sim.web.people import AWAY, HAND, PERSON, Drag
 from qpsafe.sim.web.setup import DT, MOVE, RANDOM, STRAIGHT, Setup
 from qpsafe.tick import BAD_INPUT, FAULT, Tick
 
+pytestmark = pytest.mark.long
+
 NEAR = Drag(PERSON, (0.75, 0.1, 0.0), 2.0)
 RECORDED = some(80, of=200)  # ticks
 

@@ -28,6 +28,8 @@ from qpsafe.sim.world.furniture import add_obstacles
 from qpsafe.sim.world.known import known_obstacles
 from qpsafe.sim.world.scene import build_scene
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 TICKS = 60 * EVERY
 

@@ -22,6 +22,8 @@ from qpsafe.sim.world.robot_spec import SPARE, torques
 from qpsafe.sim.world.scene import ROBOT_COLLISION, build_scene
 from qpsafe.sim.world.tool_axis import tool_axis, turned_to
 
+pytestmark = pytest.mark.long
+
 
 def quiet(path: Path, **more: Any) -> Robot:
     with warnings.catch_warnings():

@@ -31,6 +31,7 @@ def test_a_camera_is_found_without_any_guess(studio: Any, seed: int) -> None:
     assert found.deviation[0] < 2e-3
 
 
+@pytest.mark.long
 def test_a_camera_is_found_from_a_guess(studio: Any) -> None:
     """A guess that is 17 cm and 6 degrees wrong, with somebody who walks through the images."""
     rng = np.random.default_rng(1)

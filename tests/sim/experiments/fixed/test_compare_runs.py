@@ -1,12 +1,15 @@
 """Whole runs: the QP form of the law against the paper's own, in closed loop with the plant."""
 
 import numpy as np
+import pytest
 from amounts import some
 
 import qpsafe
 from qpsafe.laws.problem import LawProblem, LawResult, TaskVelocity
 from qpsafe.sim.experiments.fixed.compare import Shadow, compare_closed_loop
 from qpsafe.sim.people.choreography import Approach, Choreography
+
+pytestmark = pytest.mark.long
 
 #: Somebody comes so fast that the robot cannot evade within its limits.
 HASTE = Choreography(

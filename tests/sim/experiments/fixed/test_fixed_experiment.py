@@ -19,6 +19,8 @@ from qpsafe.sim.experiments.shared.report import summarise
 from qpsafe.sim.recording.log import RunLog, intervals
 from qpsafe.sim.world.known import known_obstacles
 
+pytestmark = pytest.mark.long
+
 LEVEL = {"low": 0, "medium": 1, "high": 2}
 ROBOT = qpsafe.load_robot("irb140")
 

@@ -16,6 +16,8 @@ from qpsafe.sim.experiments.fixed.table import robot_row
 from qpsafe.sim.experiments.shared.report import summarise
 from qpsafe.sim.people.choreography import Choreography
 
+pytestmark = pytest.mark.long
+
 ROBOTS = {name: qpsafe.load_robot(name) for name in bundled_robots()}
 
 

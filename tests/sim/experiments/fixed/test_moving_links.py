@@ -16,6 +16,8 @@ from qpsafe.sim.experiments.shared.report import summarise
 from qpsafe.sim.world.distance import TrueDistances
 from qpsafe.sim.world.scene import build_scene
 
+pytestmark = pytest.mark.long
+
 
 def on_a_foot(arms: Any, folder: Path, width: float) -> Path:
     """An arm on a foot that reaches sideways [m]."""

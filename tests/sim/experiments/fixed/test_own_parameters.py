@@ -20,6 +20,8 @@ from qpsafe.sim.stories.file import load_story
 from qpsafe.sim.tuning.robot_file import write_folder
 from qpsafe.sim.tuning.space import Space
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("name", first(1, ["irb140", "iiwa14"]))
 @pytest.mark.parametrize("parameters", first(1, ["robot", "paper"]))

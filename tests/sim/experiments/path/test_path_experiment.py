@@ -15,6 +15,8 @@ from qpsafe.sim.experiments.path.plots import side_by_side
 from qpsafe.sim.experiments.path.report import figures, on_line, promises, returning, to_dict
 from qpsafe.sim.people.choreography import Approach, Choreography
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 APPROACH = Approach(0.0, start=3.0, medium_distance=0.88, close_distance=0.72, medium_pause=0.3, close_pause=0.5)
 SHORT = Choreography((APPROACH,), duration=12.0, home_radius=1.8)

@@ -13,6 +13,8 @@ from qpsafe.sim.world.scene import Scene, build_scene
 from qpsafe.tasks.program_file import load_program
 from qpsafe.tasks.reach import joints_for
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 CELL = Cell()
 DOWN = np.diag([-1.0, 1.0, -1.0])  # tool straight down

@@ -22,6 +22,8 @@ from qpsafe.sim.experiments.pick_place.seeds import run_seeds
 from qpsafe.sim.experiments.pick_place.settings import PEOPLE
 from qpsafe.sim.experiments.pick_place.snapshots import draw, moments, visits
 
+pytestmark = pytest.mark.long
+
 ROBOT = qpsafe.load_robot("irb140")
 
 
