@@ -98,7 +98,8 @@ def path(
     with progress_bar(screen) as progress:
         for name, experiment in experiments.items():
             shown, states = (video and name == "strict", view and name == "strict"), StateRecorder()
-            with observed(experiment, out / "video.mp4", *shown, screen, progress, name, states) as (observer, _):
+            film = out / ("video.mp4" if name == "strict" else f"video-{name}.mp4")  # the others are not filmed
+            with observed(experiment, film, *shown, screen, progress, name, states) as (observer, _):
                 runs[name] = experiment.run_path(observer)
             found[name] = figures(runs[name], machine)
             near[name] = encounter(runs[name].log, experiment)

@@ -81,6 +81,7 @@ def pick_and_place(
     screen.print("Loading (the first time, compiling the kernels takes some seconds) ...", style="dim")
     from qpsafe.check.check import check_path
     from qpsafe.cli.check import refuse_or_warn
+    from qpsafe.cli.demos.watching import forget
     from qpsafe.sim.experiments.pick_place.experiment import PickPlaceExperiment
     from qpsafe.sim.experiments.pick_place.for_robot import ROBOT
     from qpsafe.sim.experiments.pick_place.plots import seeds_figure
@@ -125,6 +126,8 @@ def pick_and_place(
     if seeds > 1:
         seeds_figure(runs, alone, out / "seeds.png")
         files.append("seeds.png")
+    else:
+        forget(out / "seeds.png", screen)
     write_text(out / "report.json", json_text(result) + "\n")
     if json:
         print_json(result)
@@ -152,6 +155,7 @@ def _first(
 
 def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Console) -> list[str]:
     """Write csv, figure and snapshots, each whole or not at all; returns their names."""
+    from qpsafe.cli.demos.watching import forget
     from qpsafe.sim.drawing.gl import gl_available
     from qpsafe.sim.experiments.pick_place.plots import timeline
     from qpsafe.sim.experiments.pick_place.snapshots import draw
@@ -165,6 +169,8 @@ def _write(experiment: PickPlaceExperiment, run: PickRun, out: Path, screen: Con
         screen.print(f"no snapshots: {reason}", style="yellow")
     elif draw(experiment, run, out / "snapshots.png"):
         files.append("snapshots.png")
+    if "snapshots.png" not in files:
+        forget(out / "snapshots.png", screen)
     return files
 
 

@@ -28,6 +28,8 @@ def observed(
 ) -> Iterator[tuple[Observer, bool]]:
     """What to call at every tick to film, show, keep and count it, and whether it is filmed; says in a line why not.
 
+    After a run without a film, one of an earlier run is removed from its folder.
+
     Args:
         experiment: What is watched.
         path: Of the video.
@@ -72,3 +74,17 @@ def observed(
             progress.advance(task)
 
         yield observe, filmed
+        if not filmed:
+            forget(path, screen)
+
+
+def forget(path: Path, screen: Console) -> None:
+    """Remove a file that this run does not write: one of an earlier run would be taken for its.
+
+    Args:
+        path: Of the file, if there is one.
+        screen: Where it is said.
+    """
+    if path.is_file():
+        path.unlink()
+        screen.print(f"removed {path.name}: it was of an earlier run", style="yellow", markup=False)

@@ -93,6 +93,35 @@ def test_demo_refuses_other_sensors_before_anything_runs(sensor: str, tmp_path: 
     assert not (tmp_path / "new").exists()
 
 
+#: What a run writes under circumstances only, by command.
+PERHAPS = {
+    "fixed --duration 0.2": ("video.mp4",),
+    "path --duration 3": ("video.mp4",),
+    "fast-person --speed 2.5 --experiment fixed": ("video-fixed-2.5.mp4",),
+    "pick-and-place --cycles 1": ("video.mp4", "seeds.png", "snapshots.png"),
+}
+
+
+@pytest.mark.parametrize(
+    "words", [pytest.param(words, marks=() if "fixed" in words else pytest.mark.long) for words in PERHAPS]
+)
+def test_nothing_of_an_earlier_run_lies_beside_a_new_one(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would be taken for this run's. What is no run's stays."""
+    monkeypatch.setattr("qpsafe.sim.drawing.gl.gl_available", lambda: (False, "it is dark"))
+    kept = tmp_path / "video of mine.mp4"
+    for name in (kept.name, *PERHAPS[words]):
+        (tmp_path / name).write_bytes(b"of an earlier run")
+    result = run(app, ["demo", *words.split(), "--out", str(tmp_path)])
+    assert result.exit_code in (0, 1), result.output
+    assert kept.read_bytes() == b"of an earlier run"
+    for name in PERHAPS[words]:
+        assert not (tmp_path / name).exists()
+        assert result.output.count(f"removed {name}") == 1
+    assert any(tmp_path.glob("run*.npz"))
+
+
 @pytest.mark.slow
 def test_demo_without_opengl_says_so_in_one_line(without_display: Callable[..., Any], tmp_path: Path) -> None:
     done = without_display("demo", "fixed", "--duration", "0.2", "--out", str(tmp_path))
