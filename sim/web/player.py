@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +79,7 @@ class Player:
     def __init__(self, kept: Kept, page: Page) -> None:
         self._frames, self._page = kept.frames, page
         self.position, self.playing, self._pace = 0, True, 1.0
+        self._lock = Lock()
         server = page.server
         self.view = View(server, kept.scene)
         self.view.change(kept.scene, kept.activation)
@@ -101,20 +103,22 @@ class Player:
 
     def seek(self, at: float) -> None:
         """Go to the recorded frame nearest to a time [s]."""
-        self.position = min(max(round(at * FPS), 0), len(self._frames) - 1)
+        with self._lock:  # the page's thread seeks while another plays
+            self.position = min(max(round(at * FPS), 0), len(self._frames) - 1)
 
     def serve(self, leave: Callable[[], bool]) -> None:
         """Play until asked to leave."""
         at, clock = 0.0, time.perf_counter()
         while not leave():
             now = time.perf_counter()
-            if self.playing and self._page.watched:
-                at += (now - clock) * self._pace
-                if at * FPS >= len(self._frames):
-                    at = 0.0
-                self.position = min(int(at * FPS), len(self._frames) - 1)
-            else:
-                at = self.position / FPS
+            with self._lock:
+                if self.playing and self._page.watched:
+                    at += (now - clock) * self._pace
+                    if at * FPS >= len(self._frames):
+                        at = 0.0
+                    self.position = min(int(at * FPS), len(self._frames) - 1)
+                else:
+                    at = self.position / FPS
             clock = now
             self.show()
             time.sleep(IDLE)
@@ -127,5 +131,6 @@ class Player:
         rows = [frame.row for frame in self._frames[max(0, position - round(WINDOW * FPS)) : position + 1]]
         self.view.plots.put(rows)
         self.view.show(self._frames[position], at_once=not self.playing)
-        if self.playing and self._moved():
-            self._slider.value = round(position / FPS, 2)
+        with self._lock:
+            if self.playing and self._moved():
+                self._slider.value = round(position / FPS, 2)

@@ -182,6 +182,14 @@ def test_a_recorded_run_has_a_slider(tab: Open, program: Start, tmp_path: Path) 
     shown.until(lambda: shown.number("qp-time") > 0.5)
     shown.page.get_by_role("button", name="play or pause").click()
     field = shown.page.locator("input[inputmode='decimal']").first
+
+    def stands() -> bool:
+        """Moves of the slider that are on their way still would replace what is typed."""
+        before = field.input_value()
+        shown.page.wait_for_timeout(1_000)
+        return before == field.input_value()
+
+    shown.until(stands)
     for at in (4.0, 1.2):
         field.fill(str(at))
         field.press("Enter")
