@@ -14,7 +14,7 @@ from qpsafe.text.given import numbers, parts
 
 Array = NDArray[np.float64]
 
-_FLOAT = np.dtype(np.float64)
+_FLOAT, _ARRAYS = np.dtype(np.float64), {np.ndarray}
 
 
 class Packed(NamedTuple):
@@ -64,12 +64,13 @@ def pack(
     if levels and type(levels[0]) is not Level:  # pairs (A, b), perhaps
         try:
             matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]
-            arrays = [type(x) is np.ndarray and x.dtype is _FLOAT for x in matrices + lows]
-            if all(arrays):  # concatenated, masks would be lost and truth values be numbers
+            if set(map(type, matrices + lows)) == _ARRAYS:  # concatenated, masks would be lost
                 highs = lows
                 if hard is not None:
                     matrices, lows, highs = (hard.A, *matrices), (hard.lower, *lows), (hard.upper, *highs)
-                matrix, low = np.concatenate(matrices), np.concatenate(lows)
+                # nor are truth values numbers: "no" casting
+                matrix = np.concatenate(matrices, dtype=_FLOAT, casting="no")
+                low = np.concatenate(lows, dtype=_FLOAT, casting="no")
                 high = low if hard is None else np.concatenate(highs)
                 counts = list(map(len, matrices))
                 plain = counts == list(map(len, lows)) and matrix.ndim == 2 and low.ndim == 1

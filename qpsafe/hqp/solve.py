@@ -81,7 +81,7 @@ def solve_hierarchy(
     """
     begin = perf_counter()
     problem = pack(levels, lower, upper, rows)
-    near = _damping(damping, len(problem.counts) - problem.hard, problem.hard)
+    near = None if type(damping) is float and damping == 0.0 else _damping(damping, problem)
     if solver is None or (isinstance(solver, str) and solver == "own"):
         return _own(problem, begin, near)
     if near is not None:
@@ -89,10 +89,10 @@ def solve_hierarchy(
     return _by_back_end(problem, solver, begin)
 
 
-def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array | None:
+def _damping(damping: float | Sequence[float], problem: Packed) -> Array | None:
     """ε of every level, hard rows first, which have none; None if all are 0."""
-    if type(damping) is float and damping == 0.0:
-        return None
+    hard = int(problem.hard)
+    levels = len(problem.counts) - hard
     if type(damping) is float or (type(damping) is list and set(map(type, damping)) == {float}):
         values = np.array(damping)
     else:
@@ -103,7 +103,7 @@ def _damping(damping: float | Sequence[float], levels: int, hard: bool) -> Array
     if not values.any():
         return None
     near = np.zeros(levels + hard)
-    near[int(hard) :] = values
+    near[hard:] = values
     return near
 
 
@@ -138,7 +138,7 @@ def _own(problem: Packed, begin: float, damping: Array | None = None, note: str 
         from qpsafe.hqp.own.solver import solve_packed
 
         _solve_packed, begin = solve_packed, perf_counter()
-    qd, info = _solve_packed(*problem, damping=damping)
+    qd, info = _solve_packed(*problem, damping)
     code, turns, where = info[:3].tolist()
     status = STATUS[code]
     if code > 1 and not note:

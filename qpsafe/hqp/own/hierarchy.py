@@ -93,9 +93,7 @@ def run(
             last = ends[level] if level < levels else rows + n
             if last > first and start < n:
                 near = damping[level] if level < levels else 0.0
-                start, turns = minimise_compiled(
-                    floats, integers, x, rows + 2 * n, m + n, level, first, last, start, limit, mode, near
-                )  # fmt: skip
+                start, turns = minimise_compiled(s, level, first, last, start, limit, mode, near)
                 info[1] += turns
                 if start < 0:
                     info[0], info[2] = TURNS, level

@@ -24,14 +24,13 @@ import numpy as np
 from numba import types
 
 from qpsafe.compiled import by_reference as by_reference_module
-from qpsafe.compiled.by_reference import by_reference
 from qpsafe.compiled.compiled import entry, inline, linked
 from qpsafe.hqp.own import damping as damping_module
 from qpsafe.hqp.own import linear, rules, state
 from qpsafe.hqp.own.damping import damp, nearly_singular
-from qpsafe.hqp.own.linear import Array, Index, along, dot, factorise, image, least_squares, reflect, unturn
+from qpsafe.hqp.own.linear import along, dot, factorise, image, least_squares, reflect, unturn
 from qpsafe.hqp.own.rules import multipliers, ratio_test, wrong_way
-from qpsafe.hqp.own.state import FREE, LOCKED, State, cut, hold, release
+from qpsafe.hqp.own.state import FREE, LOCKED, STATE, State, hold, release
 
 RANK = 1e-10  # rows shorter than this in the freedom left, relative to their level, count as dependent
 BLAND = 40  # turns after which Bland's rule chooses
@@ -120,20 +119,17 @@ def load_factor(s: State, start: int, w: int, count: int, tolerance: float) -> i
 
 
 @entry(
-    types.UniTuple(types.int64, 2)(types.float64[::1], types.int64[::1], types.float64[::1], *[types.int64] * 8,
-                                   types.float64),
+    types.UniTuple(types.int64, 2)(STATE, *[types.int64] * 6, types.float64),
     by_reference_module, linear, state, damping_module, rules,
     python=False,
 )  # fmt: skip
 def minimise_level(
-    floats: Array, integers: Index, x: Array, rows: int, most: int, level: int, first: int, last: int, start: int,
-    limit: int, mode: int, damping: float,
+    s: State, level: int, first: int, last: int, start: int, limit: int, mode: int, damping: float
 ) -> tuple[int, int]:  # fmt: skip
     """Minimise the level of rows first..last over the freedom of basis vectors start.. .
 
     Args:
-        floats, integers, x, rows, most: of `cut`, which cuts the arrays. x moves, the basis turns, locked constraints
-            and the level's directions leave the freedom.
+        s: arrays. x moves, the basis turns, locked constraints and the level's directions leave the freedom.
         level: its number, remembered in `kind` of the constraints it locks.
         first: first row of the level.
         last: one past its last row.
@@ -145,8 +141,7 @@ def minimise_level(
     Returns:
         New number of used basis vectors (-1 if the turns did not suffice), and the turns taken.
     """
-    s = by_reference(cut(floats, integers, x, rows, most))
-    A, low, high, kind, side, G = s.A, s.low, s.high, s.kind, s.side, s.G
+    A, low, high, kind, side, x, G = s.A, s.low, s.high, s.kind, s.side, s.x, s.G
     working, chosen, d, r, u, reach = s.working, s.chosen, s.d, s.r, s.u, s.reach
     n, m = x.shape[0], last - first
     count, inequalities, norm, least = choose(s, first, last)

@@ -37,15 +37,15 @@ solve = entry(_SIGNATURE, *MODULES)(run)
 solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""
 _NO_WEIGHTS = np.empty(0)
-_memory: dict[tuple[int, ...], tuple[Array, Index, int, Index]] = {}
+_memory: dict[tuple[int, ...], tuple[Array, Index, int, Index, Array]] = {}
 
 
-def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index]:
+def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index, Array]:
     """Workspace for levels of `counts` rows; kept, because its contents matter during a call only (under the GIL)."""
     if len(_memory) >= 64:
         _memory.clear()
     m = max(n, *counts) if counts else n
-    memory = (*workspace(n, sum(counts), m), m, np.cumsum(counts, dtype=np.int64))
+    memory = (*workspace(n, sum(counts), m), m, np.cumsum(counts, dtype=np.int64), np.zeros(len(counts)))
     _memory[(n, *counts)] = memory
     return memory
 
@@ -59,7 +59,6 @@ def solve_packed(
     box_low: Array,
     box_high: Array,
     hard: bool,
-    *,
     damping: Array | None = None,
 ) -> tuple[Array, Index]:
     """Solve levels of `counts` rows each, packed one below the other.
@@ -79,10 +78,10 @@ def solve_packed(
         q̇ (n,), and `info` of `hierarchy.run`.
     """
     n = box_low.shape[0]
-    floats, integers, m, ends = _memory.get((n, *counts)) or _layout(n, counts)
+    floats, integers, m, ends, undamped = _memory.get((n, *counts)) or _layout(n, counts)
     x = np.zeros(n)
     info = np.zeros(HEADER + n + A.shape[0], np.int64)
     weights = _NO_WEIGHTS if weight is None else weight
-    near = np.zeros(len(counts)) if damping is None else damping
+    near = undamped if damping is None else damping
     solve(floats, integers, m, x, info, A, low, high, weights, ends, box_low, box_high, hard, near)
     return x, info

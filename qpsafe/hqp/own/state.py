@@ -6,7 +6,9 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
+from qpsafe.compiled.by_reference import Reference
 from qpsafe.compiled.compiled import inline
 from qpsafe.compiled.memory import view
 from qpsafe.hqp.own.linear import Array, Index, householder, image, reflect, remove_column
@@ -63,6 +65,15 @@ class State(NamedTuple):
     reach: Array
     reference: Array
     flags: Index
+
+
+_WHOLE, _MATRICES = ("kind", "side", "working", "chosen", "flags"), ("A", "G", "R", "F")
+_arrays = [
+    types.Array(types.int64 if name in _WHOLE else types.float64, 2 if name in _MATRICES else 1, "C")
+    for name in State._fields
+]
+#: Type of a state that is handed on by reference.
+STATE = Reference(types.NamedTuple(_arrays, State))
 
 
 def workspace(n: int, rows: int, m: int) -> tuple[Array, Index]:
