@@ -19,7 +19,7 @@ from math import isfinite, log1p, nan, sqrt
 from numba import types
 
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, readable, row, scale
-from qpsafe.danger import link_field, speed
+from qpsafe.danger import link_field
 from qpsafe.danger.link_field import NODES, WEIGHTS, placed
 from qpsafe.danger.speed import Motion, motion_of, pole_integral
 
@@ -78,7 +78,7 @@ _rows = readable(2)
 @entry(
     types.void(_rows, _rows, _rows, _rows, _rows, *[types.float64] * 3, types.Array(types.float64, 4, "C")),
     link_field,
-    speed,
+    *link_field.USES,
 )
 def velocity_gradient(
     points: Array, r0: Array, r1: Array, v0: Array, v1: Array, kinetic: float, gamma: float, floor: float, out: Array

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from qpsafe.compiled import compiled
 from qpsafe.compiled.compiled import Array, entry, inline, linked, readable, row
 from qpsafe.compiled.memory import view
-from qpsafe.danger import link_field, push, speed
+from qpsafe.danger import link_field, push
 from qpsafe.danger.evasion import filter_by, rub
 from qpsafe.danger.link_field import danger_field
 from qpsafe.danger.push import push_vectors
@@ -36,7 +36,7 @@ from qpsafe.sensing.readings import take_readings
 # each is compiled once, for Python and for these calls
 _forward, _wire_of, _filter_by, _rub = linked(forward), linked(wire_of), linked(filter_by), linked(rub)
 _take_readings, _push_vectors = linked(take_readings, *readings.USES), linked(push_vectors, *push.USES)
-_find_nearest, _danger_field = linked(find_nearest, compiled), linked(danger_field, speed)
+_find_nearest, _danger_field = linked(find_nearest, compiled), linked(danger_field, *link_field.USES)
 
 # the block of integers begins with sizes, then tells where each field of the two blocks begins
 JOINTS, ENDS, LINKS, SPOTS, HULLS, FACES, MEMORY = range(7)
@@ -184,7 +184,7 @@ def _append(count: int, more: Array, more_links: Index, points: Array, links: In
 
 
 #: All the code that goes into both calls, but for the points.
-USES = (kinematics, push, ranged, *push.USES, link_field, speed)
+USES = (kinematics, push, ranged, *push.USES, link_field, *link_field.USES)
 _ints, _outs = types.int64[::1], types.float64[:, ::1]
 _more = (readable(2), types.Array(types.int64, 1, "A", readonly=True))
 

@@ -14,14 +14,14 @@ from numba import types
 from numpy.typing import NDArray
 
 from qpsafe.compiled.compiled import Array, Vector, add, dot, entry, inline, linked, readable, row, scale
-from qpsafe.danger import link_field, speed
+from qpsafe.danger import link_field
 from qpsafe.danger.link_field import danger_field
 from qpsafe.robot.kinematics import Index
 from qpsafe.sensing import hold
 from qpsafe.sensing.hold import from_wire
 
-_danger_field = linked(danger_field, speed)
-USES = (link_field, speed, hold)
+_danger_field = linked(danger_field, *link_field.USES)
+USES = (link_field, *link_field.USES, hold)
 #: Steps of a way to the wire.
 _STEPS = 8
 
