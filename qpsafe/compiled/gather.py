@@ -15,7 +15,13 @@ from qpsafe.compiled.lanes import INDEX, LANES, NUMBERS, VECTOR, is_number, spre
 
 
 def gather(rows: Any, first: int, column: int) -> Any:
-    """A column of the rows of an array (n, m) from the first on, n >= 1; the last row again where there are no more."""
+    """Lanes from the rows of an array.
+
+    Args:
+        rows: (n, m), n >= 1.
+        first: The row of the first lane; the last row comes again where there are no more.
+        column: Of all of them.
+    """
     return rows[np.minimum(first + np.arange(LANES), len(rows) - 1), column]
 
 

@@ -145,7 +145,13 @@ def _absolute(context: Any, builder: Any, signature: Any, values: Any) -> Any:
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
-    """`yes` in the lanes where the condition holds, `no` in the others."""
+    """Choose lane by lane.
+
+    Args:
+        condition: Truth values.
+        yes: Numbers where it holds.
+        no: Numbers where it does not.
+    """
     return np.where(condition, yes, no)
 
 

@@ -138,7 +138,7 @@ def _own(problem: Packed, begin: float, damping: Array | None = None, note: str 
         from qpsafe.hqp.own.solver import solve_packed
 
         _solve_packed, begin = solve_packed, perf_counter()
-    qd, info = _solve_packed(*problem, damping)
+    qd, info = _solve_packed(problem, damping)
     code, turns, where = info[:3].tolist()
     status = STATUS[code]
     if code > 1 and not note:

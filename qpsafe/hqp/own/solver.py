@@ -14,6 +14,7 @@ from qpsafe.compiled.compiled import entry, linked
 from qpsafe.hqp.own import damping, hierarchy, level, linear, rules, state
 from qpsafe.hqp.own.hierarchy import HEADER, run
 from qpsafe.hqp.own.state import workspace
+from qpsafe.hqp.packing import Packed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -50,33 +51,17 @@ def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index, Ar
     return memory
 
 
-def solve_packed(
-    A: Array,
-    low: Array,
-    high: Array,
-    weight: Array | None,
-    counts: Sequence[int],
-    box_low: Array,
-    box_high: Array,
-    hard: bool,
-    damping: Array | None = None,
-) -> tuple[Array, Index]:
-    """Solve levels of `counts` rows each, packed one below the other.
+def solve_packed(problem: Packed, damping: Array | None = None) -> tuple[Array, Index]:
+    """Solve levels packed one below the other.
 
     Args:
-        A: (rows, n), C-contiguous.
-        low: (rows,) lower bounds.
-        high: (rows,) upper bounds.
-        weight: (rows,) weights or None.
-        counts: rows of each level.
-        box_low: (n,) lower limits.
-        box_high: (n,) upper limits.
-        hard: whether the first level are hard rows.
+        problem: What is to be solved.
         damping: (levels,) singular values below it are damped; None for none.
 
     Returns:
         q̇ (n,), and `info` of `hierarchy.run`.
     """
+    A, low, high, weight, counts, box_low, box_high, hard = problem
     n = box_low.shape[0]
     floats, integers, m, ends, undamped = _memory.get((n, *counts)) or _layout(n, counts)
     x = np.zeros(n)
