@@ -67,6 +67,39 @@ def _lane(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     return builder.extract_element(values[0], context.cast(builder, values[1], signature.args[1], types.int32))
 
 
+def put(x: Any, array: Any, start: int, count: int) -> None:
+    """Lanes into an array.
+
+    Args:
+        x: The lanes.
+        array: (n,), contiguous.
+        start: Where in it.
+        count: How many of the lanes, all if there are more.
+    """
+    array[start : start + min(count, LANES)] = x[: min(count, LANES)]
+
+
+@type_callable(put)
+def _type_of_put(_: Any) -> Any:
+    def of(x: Any, array: Any, start: Any, count: Any) -> Any:
+        fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype == types.float64
+        return types.void if x is NUMBERS and fits else None
+
+    return of
+
+
+@lower_builtin(put, NUMBERS, types.Array, types.Integer, types.Integer)
+def _put(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    _, kind, *whole = signature.args
+    array = make_array(kind)(context, builder, values[1])
+    start, count = (context.cast(builder, x, k, types.intp) for x, k in zip(values[2:], whole, strict=True))
+    for k in range(LANES):
+        with builder.if_then(builder.icmp_signed(">", count, ir.Constant(count.type, k)), likely=True):
+            place = builder.gep(array.data, [builder.add(start, ir.Constant(start.type, k))])
+            builder.store(builder.extract_element(values[0], ir.Constant(INDEX, k)), place)
+    return context.get_dummy_value()
+
+
 def spread(x: Any) -> Any:
     """The same number in every lane."""
     return np.full(LANES, x)

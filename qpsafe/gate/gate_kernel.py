@@ -20,7 +20,6 @@ from qpsafe.gate.people_kernel import LEFT, look, people_excess
 from qpsafe.gate.solids_kernel import touched
 from qpsafe.gate.tables import CAPSULES, DT, GROUPS, PAIRS, SHAPES
 from qpsafe.geometry import pairs as pairs_module
-from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
 
 BISECTIONS = 5  # λ is found to 1/32
@@ -37,8 +36,8 @@ TOLD = 5
 WORTH_SAYING = 1e-3  # that braking is short of, well within the error of a seen point [m]
 
 USES = (
-    reference_module, tables, workspace, braking_path, people_kernel, solids_kernel, kinematics, pairs_module,
-    *pairs_module.USES,
+    reference_module, tables, workspace, braking_path, people_kernel, solids_kernel, pairs_module,
+    *people_kernel.USES, *pairs_module.USES,
 )  # fmt: skip
 
 

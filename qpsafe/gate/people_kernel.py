@@ -24,16 +24,21 @@ p' that p may have moved to, if `sidestep` is infinite: its conditions are then 
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any
 
-from qpsafe.compiled.compiled import Array, inline, linked
+from qpsafe.compiled import gather as gather_module
+from qpsafe.compiled import lanes
+from qpsafe.compiled.compiled import Array, Vector, inline, linked, row
+from qpsafe.compiled.gather import gather, put
+from qpsafe.compiled.lanes import LANES, sqrt, where
 from qpsafe.gate.braking_path import at_time, braked, covered, ticks_of
 from qpsafe.gate.tables import APPROACH, DT, MAX_AGE, NEAR, PERSON, SIDESTEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut, forward, place
 
 _forward = linked(forward, kinematics)
+#: All the code that goes into kernels with this.
+USES = (lanes, gather_module, kinematics)
 _ROUNDING = 1e-9  # [m/s]
 MOST = 16  # ticks that are looked at together, a power of 2
 LEFT = 2  # place in `Work.worst` of how many instants may still be looked at in this tick
@@ -65,12 +70,13 @@ def place_axes(t: Any, memory: Array, axes: Array) -> None:
 
 
 @inline
-def to_axis(axis: Array, p: Array) -> tuple[float, float]:
-    """Distance of a point from a segment (2, 3), and where on it the nearest point is, 0 to 1."""
+def to_axis(axis: Array, p: Vector) -> tuple[float, float]:
+    """Distance of a point from a segment (2, 3), and where on it the nearest one is, 0 to 1; of one point, or lanes."""
     dx, dy, dz = axis[1, 0] - axis[0, 0], axis[1, 1] - axis[0, 1], axis[1, 2] - axis[0, 2]
     x, y, z = p[0] - axis[0, 0], p[1] - axis[0, 1], p[2] - axis[0, 2]
     dd = dx * dx + dy * dy + dz * dz
-    s = min(max((x * dx + y * dy + z * dz) / dd, 0.0), 1.0) if dd > 0.0 else 0.0
+    s = where(dd > 0.0, (x * dx + y * dy + z * dz) / dd, 0.0)
+    s = where(s > 0.0, where(s < 1.0, s, 1.0), 0.0)
     x, y, z = x - s * dx, y - s * dy, z - s * dz
     return sqrt(x * x + y * y + z * z), s
 
@@ -78,9 +84,12 @@ def to_axis(axis: Array, p: Array) -> tuple[float, float]:
 @inline
 def measure_all(axes: Array, points: Array, away: Array) -> None:
     """Distances of all capsules' axes from all points, one capsule after the other (c p,)."""
-    for c in range(axes.shape[0]):
-        for k in range(points.shape[0]):
-            away[c * points.shape[0] + k], _ = to_axis(axes[c], points[k])
+    count = points.shape[0]
+    for first in range(0, count, LANES):
+        p = gather(points, first, 0), gather(points, first, 1), gather(points, first, 2)
+        for c in range(axes.shape[0]):
+            distance, _ = to_axis(axes[c], p)
+            put(distance, away, c * count + first, count - first)
 
 
 @inline
@@ -194,7 +203,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, enough: flo
                 continue  # so it is for the rest of the way
             w.hot[left] = pair
             left += 1
-            distance, s = to_axis(w.axes[c], points[k])
+            distance, s = to_axis(w.axes[c], row(points, k))
             gap = distance - t.radii[c] - radius - person * w.ages[k] - fastest * dt
             if gap >= 0.0:
                 ahead = min(ahead, 1 + int(min(gap / ((person + fastest) * dt), 1e6)))

@@ -25,15 +25,14 @@ from numba import types
 
 from qpsafe.compiled import by_reference as reference_module
 from qpsafe.compiled.by_reference import by_reference
-from qpsafe.compiled.compiled import Array, entry, inline, readable
+from qpsafe.compiled.compiled import Array, entry, inline, readable, row
 from qpsafe.gate import braking_path, people_kernel, tables, workspace
 from qpsafe.gate.people_kernel import look, to_axis
 from qpsafe.gate.tables import CAPSULES, DT, ESCAPE, NEAR, PAIRS, PERSON, SHAPES
-from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
 
 #: All the code that goes into the kernel.
-USES = (reference_module, tables, workspace, braking_path, people_kernel, kinematics)
+USES = (reference_module, tables, workspace, braking_path, people_kernel, *people_kernel.USES)
 _block, _whole = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
 _out = types.float64[::1]
 
@@ -96,7 +95,7 @@ def hold_still(
             room = w.away[a * points.shape[0] + k] - t.radii[a] - t.numbers[NEAR]
             if room > fastest * (longest + w.ages[k]):
                 continue
-            escape, now = _away(t, w, a, points[k], qd)
+            escape, now = _away(t, w, a, row(points, k), qd)
             if escape >= t.numbers[ESCAPE]:
                 continue
             speed = t.numbers[PERSON] + max(now, 0.0)
