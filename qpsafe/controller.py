@@ -209,7 +209,7 @@ class SafetyController(Running):
         commanded, stall = RobotState(self._robot, self._q), self._stall
         old = NO_AGES if self._sensing is None else self._sensing.as_ages(ages)
         gate, people, leads = self.verifies, seen.people, seen.leads
-        most = gate.hold(self._q, self._qd, people, old, leads) if gate is not None and len(people) else None
+        most = gate.hold(commanded, self._qd, people, old, leads) if gate is not None and len(people) else None
         if self._seq % stall.every == 0 or stall.held:
             capped = len(seen.points) > 0 and (barrier is not None or separation is not None)
             explained = seen.capped or not min(activations) >= 1.0 or capped or most is not None

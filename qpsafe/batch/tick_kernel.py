@@ -72,7 +72,7 @@ def _plan(
     for j in range(most.shape[0]):
         most[j] = inf
     if p.gate.shape[0] > 0:
-        held = _hold_still(p.gate, p.gate_whole, w.gate, w.gate_whole, s.q, s.qd, seen, ages, leads, most)
+        held = _hold_still(p.gate, p.gate_whole, w.gate, w.gate_whole, w.memory, s.qd, seen, ages, leads, most)
     watch_stall(p, s, w, s.marks[code.CAPPED] == 1 or not least >= 1.0 or held > 0)
     update(p, s, w, s.result[code.CDF_N], least, goals, twists)
     for path in range(p.kinds.shape[0]):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from qpsafe.limits import JointLimits
     from qpsafe.robot.robot import Robot
+    from qpsafe.robot.state import RobotState
     from qpsafe.sensing.hulls import Obstacle
 
 Array = NDArray[np.float64]
@@ -81,11 +82,12 @@ class Gate(Fixed):
         )  # fmt: skip
         return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
 
-    def hold(self, q: Array, qd: Array, points: Array, ages: Array, leads: Array = NO_AGES) -> Array | None:
+    def hold(self, state: RobotState, qd: Array, points: Array, ages: Array, leads: Array = NO_AGES) -> Array | None:
         """Largest speeds of joints (n,) [rad/s] that must stand before a link is touched; infinite for the others.
 
         Args:
-            q, qd: Commanded position and velocity (n,) [rad, rad/s].
+            state: Where the robot is commanded to be.
+            qd: Its commanded velocity (n,) [rad/s].
             points, ages, leads: As for a command.
 
         Returns:
@@ -95,9 +97,9 @@ class Gate(Fixed):
             return None
         if len(points) > self._room:
             self._make_room(len(points))
-        self._looked[:] = q, points, ages, leads
-        most = np.empty(len(q))
-        return most if hold_still(*self.blocks, *self._work, q, qd, points, ages, leads, most) else None
+        self._looked[:] = state.q, points, ages, leads
+        most = np.empty(len(qd))
+        return most if hold_still(*self.blocks, *self._work, state.memory, qd, points, ages, leads, most) else None
 
     def notes(self) -> tuple[str, ...]:
         """Doubts about the geometry that it measures with, in words."""

@@ -16,7 +16,7 @@ from qpsafe.compiled.compiled import Array, entry, inline, readable
 from qpsafe.compiled.memory import view
 from qpsafe.gate import braking_path, people_kernel, solids_kernel, tables, workspace
 from qpsafe.gate.braking_path import slow_down
-from qpsafe.gate.people_kernel import LEFT, look, people_excess
+from qpsafe.gate.people_kernel import LEFT, look, people_excess, stand
 from qpsafe.gate.solids_kernel import touched
 from qpsafe.gate.tables import CAPSULES, DT, GROUPS, PAIRS, SHAPES
 from qpsafe.geometry import pairs as pairs_module
@@ -90,7 +90,8 @@ def let_through(
     told[SHARE], told[CAUSE], told[WHO], told[POINT], told[SHORT] = 1.0, 0.0, -1.0, -1.0, 0.0
     w.worst[LEFT] = LOOKS
     if measured == 0:
-        look(t, w, q, points, ages, leads)
+        stand(t, q, w.none, w.nowhere, w.memory)
+        look(t, w, w.memory, points, ages, leads)
     slow_down(qd, t.acceleration, t.numbers[DT], w.brake)
     low, high, share = 0.0, 1.0, 1.0
     cause, who, point = 0.0, -1.0, -1.0

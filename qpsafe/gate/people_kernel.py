@@ -103,15 +103,14 @@ def _oldest(ages: Array, most: float) -> float:
 
 
 @inline
-def look(t: Any, w: Any, q: Array, points: Array, ages: Array, leads: Array) -> None:
-    """Ages of all points, and their distances from all axes at q; nothing to do where there are no points."""
+def look(t: Any, w: Any, memory: Array, points: Array, ages: Array, leads: Array) -> None:
+    """Ages of all points, and their distances from all axes, whose bodies stand in `memory`; nothing without points."""
     if points.shape[0] == 0:
         return
     oldest, first = _oldest(ages, t.numbers[MAX_AGE]), points.shape[0] - leads.shape[0]
     for k in range(points.shape[0]):
         w.ages[k] = oldest if k < first else leads[k - first]
-    stand(t, q, w.none, w.nowhere, w.memory)
-    place_axes(t, w.memory, w.axes)
+    place_axes(t, memory, w.axes)
     measure_all(w.axes, points, w.away)
 
 

@@ -38,9 +38,9 @@ _out = types.float64[::1]
 
 
 @inline
-def _away(t, w, c, p, qd):  # type: ignore[no-untyped-def]
+def _away(t, w, memory, c, p, qd):  # type: ignore[no-untyped-def]
     """How fast a capsule could be going away from a point after a moment, and how fast it approaches it now [m/s]."""
-    axis, twists, on = w.axes[c], cut(w.memory, qd.shape[0], 0)[1], t.supports[t.bodies[c]]
+    axis, twists, on = w.axes[c], cut(memory, qd.shape[0], 0)[1], t.supports[t.bodies[c]]
     distance, s = to_axis(axis, p)
     if not distance > 0.0:
         return 0.0, 0.0
@@ -67,7 +67,7 @@ def _away(t, w, c, p, qd):  # type: ignore[no-untyped-def]
     *USES,
 )  # fmt: skip
 def hold_still(
-    floats: Array, integers: Index, work: Array, whole: Index, q: Array, qd: Array, points: Array, ages: Array,
+    floats: Array, integers: Index, work: Array, whole: Index, memory: Array, qd: Array, points: Array, ages: Array,
     leads: Array, most: Array,
 ) -> int:  # fmt: skip
     """Fill `most` (n,) with the joints' largest speeds, infinite where nothing holds them; returns how many are held.
@@ -75,14 +75,15 @@ def hold_still(
     Args:
         floats, integers: `Tables`.
         work, whole: `Work` for at least as many points; what was measured in it stays, for `let_through`.
-        q, qd: Where the robot is commanded to be, and its commanded velocity (n,) [rad, rad/s].
+        memory: Of `kinematics.forward`, where the robot is commanded to be.
+        qd: Its commanded velocity (n,) [rad/s].
         points, ages, leads: As for `let_through`.
         most: [rad/s].
     """
-    n, c, held = q.shape[0], integers[CAPSULES], 0
+    n, c, held = qd.shape[0], integers[CAPSULES], 0
     t = by_reference(tables.tables(floats, integers))
     w = by_reference(workspace.workspace(work, whole, n, c, integers[SHAPES], integers[PAIRS], points.shape[0]))
-    look(t, w, q, points, ages, leads)
+    look(t, w, memory, points, ages, leads)
     longest, dt = 0.0, t.numbers[DT]  # what takes longer to come cannot hold any joint yet
     for j in range(n):
         most[j] = inf
@@ -95,7 +96,7 @@ def hold_still(
             room = w.away[a * points.shape[0] + k] - t.radii[a] - t.numbers[NEAR]
             if room > fastest * (longest + w.ages[k]):
                 continue
-            escape, now = _away(t, w, a, row(points, k), qd)
+            escape, now = _away(t, w, memory, a, row(points, k), qd)
             if escape >= t.numbers[ESCAPE]:
                 continue
             speed = t.numbers[PERSON] + max(now, 0.0)

@@ -167,6 +167,6 @@ def test_no_number_gets_past_it(seed: int) -> None:
     assert (command <= box.upper + 1e-12).all()
     assert 0.0 <= gated.share <= 1.0
     assert math.isfinite(gated.short)
-    most = gate.hold(q, qd, points, NO_AGES)
+    most = gate.hold(ROBOT.at(q), qd, points, NO_AGES)
     if most is not None:  # braking is always among what is allowed
         assert (most >= np.maximum(np.abs(qd) - limits.max_acceleration * limits.dt, 0.0)).all()

@@ -62,7 +62,7 @@ def test_what_is_held_is_what_another_reckoning_holds(name: str, escape: float) 
         q, qd = drawn(robot, rng)
         points = beside(robot, q, rng, int(rng.integers(1, 6)))
         leads = rng.uniform(0.0, 0.1, len(points))
-        most = gate.hold(q, qd, points, FRESH, leads)
+        most = gate.hold(robot.at(q), qd, points, FRESH, leads)
         expected = reckoned(robot, rules, q, qd, points, leads)
         np.testing.assert_allclose(np.full(robot.nq, np.inf) if most is None else most, expected, rtol=1e-9, atol=1e-9)
         held, free = held + int(np.isfinite(expected).sum()), free + int(np.isinf(expected).sum())
@@ -77,7 +77,7 @@ def test_more_people_hold_no_less(name: str) -> None:
     for _ in range(100):
         q, qd = drawn(robot, rng)
         points = beside(robot, q, rng, 4)
-        few, many = (gate.hold(q, qd, seen, FRESH) for seen in (points[:2], points))
+        few, many = (gate.hold(robot.at(q), qd, seen, FRESH) for seen in (points[:2], points))
         assert few is None or (many is not None and (many <= few).all())
 
 
@@ -86,10 +86,10 @@ def test_nobody_and_no_escape_hold_nothing() -> None:
     limits = JointLimits.of(robot, DT)
     q, qd = drawn(robot, rng)
     points = beside(robot, q, rng, 5)
-    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(q, qd, points, FRESH) is not None
-    assert Gate(robot, VerifiedMotion(escape=0.0), limits).hold(q, qd, points, FRESH) is None
-    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(q, qd, np.empty((0, 3)), FRESH) is None
-    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(q, qd, points + 9.0, FRESH) is None
+    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(robot.at(q), qd, points, FRESH) is not None
+    assert Gate(robot, VerifiedMotion(escape=0.0), limits).hold(robot.at(q), qd, points, FRESH) is None
+    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(robot.at(q), qd, np.empty((0, 3)), FRESH) is None
+    assert Gate(robot, VerifiedMotion(escape=100.0), limits).hold(robot.at(q), qd, points + 9.0, FRESH) is None
 
 
 @pytest.mark.parametrize("name", first(1, NAMES))
@@ -112,7 +112,7 @@ def test_who_moves_as_reckoned_finds_the_link_at_rest(name: str) -> None:
                     assert (np.abs(qd[moved]) <= 2.0 * a[moved] * DT + 1e-9).all()
                     touched += 1
                 break
-            most = gate.hold(q, qd, p, FRESH)
+            most = gate.hold(robot.at(q), qd, p, FRESH)
             if tick < 100:  # nobody comes yet: the joints are brought to the bound
                 p = p + (rng.normal(0.0, 0.5, (1, 3)) if distances.min() < 0.7 else 0.0)
             wish = np.clip(
@@ -195,7 +195,7 @@ def test_jerk_limits_give_way(max_jerk: float) -> None:
     for k in range(200):
         hand = np.array((0.9 - 0.0064 * k, -0.1, 0.25))
         assert controller.verifies is not None
-        most = controller.verifies.hold(q, qd, hand[None], FRESH)
+        most = controller.verifies.hold(robot.at(q), qd, hand[None], FRESH)
         tick = controller.step(q, qd, points=[hand])
         new = tick.reference.qd
         if most is not None:
@@ -225,7 +225,7 @@ def test_gentle_limits_of_the_way_back_give_way(irb140: Robot) -> None:
             away = 0.6 - 0.002 * k if k < 200 else rng.uniform(1.5, 3.0) if moment <= back < moment + 5 else 20.0
             hand = here[:3, 3] + away * np.array((0.8, 0.0, 0.6))
             assert controller.verifies is not None
-            most = controller.verifies.hold(q, qd, hand[None], FRESH)
+            most = controller.verifies.hold(controller.robot.at(q), qd, hand[None], FRESH)
             tick = controller.step(q, qd, points=[hand])
             if most is not None and tick.phase == "recovering":
                 assert (np.abs(tick.reference.qd) <= most + 1e-9).all()
