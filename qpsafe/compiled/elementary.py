@@ -49,36 +49,41 @@ def _polynomial(coefficients: tuple[float, ...], z: Any) -> Any:
 
 
 @inline
-def log(x: Any) -> Any:
-    """Natural logarithm."""
+def _log(x: Any, more: Any) -> Any:
+    """log(x + more) for 0 < x < inf, with `more` below a unit of the last place of x."""
     small = x < 1e-300  # subnormal numbers have no leading one
-    m, e = split(where(small, x * 2.0**64, x))
+    m, e, scale = split(where(small, x * 2.0**64, x))
     e = where(small, e - 64.0, e)
     upper = m > 2.0 * _HALF
-    m, e = where(upper, 0.5 * m, m), where(upper, e + 1.0, e)
-    s = (m - 1.0) / (m + 1.0)
+    m, e, scale = where(upper, 0.5 * m, m), where(upper, e + 1.0, e), where(upper, 0.5 * scale, scale)
+    s = (m - 1.0 + more * scale) / (m + 1.0)
     z = s * s
-    tail = _polynomial(_LOG, z)
-    value = e * _LN2 + (2.0 * s + (2.0 * s * z * tail + e * _LN2_REST))
-    return where((x > 0.0) & (x < inf), value, where(x == 0.0, -inf, where(x > 0.0, inf, nan)))
+    return e * _LN2 + (2.0 * s + (2.0 * s * z * _polynomial(_LOG, z) + e * _LN2_REST))
+
+
+@inline
+def log(x: Any) -> Any:
+    """Natural logarithm."""
+    return where((x > 0.0) & (x < inf), _log(x, 0.0), where(x == 0.0, -inf, where(x > 0.0, inf, nan)))
 
 
 @inline
 def log1p(x: Any) -> Any:
     """log(1 + x) for x >= 0, exact for small x."""
     u = 1.0 + x
-    return where(x < inf, log(u) + (x - (u - 1.0)) / u, log(x))
+    value = where(u == 1.0, x, _log(u, x - (u - 1.0)))
+    return where(x < inf, value, where(x > 0.0, inf, nan))
 
 
 @inline
 def atan2(y: Any, x: Any) -> Any:
-    """Angle of a finite point of the plane [rad]; 0 for the origin."""
-    a, b = abs(x), abs(y)
+    """Angle of a finite point of the plane [rad], 0 for the origin; subnormal numbers lose digits."""
+    a, b = 0.5 * abs(x), 0.5 * abs(y)  # whose sum does not overflow
     steep = b > a
     high, low = where(steep, b, a), where(steep, a, b)
-    t = where(high > 0.0, low / high, high)  # not 0/0; NaN stays
-    beyond = t > _EIGHTH
-    t = where(beyond, (t - 1.0) / (t + 1.0), t)  # the angle less π/4
+    beyond = low > _EIGHTH * high
+    # tan of the angle, or of the angle less π/4
+    t = where(beyond, low - high, low) / where(high == 0.0, 1.0, where(beyond, low + high, high))
     z = t * t
     tail = _polynomial(_ATAN, z)
     angle = t + t * z * tail

@@ -217,10 +217,10 @@ def copysign(x: Any, y: Any) -> Any:
     return np.copysign(x, y)
 
 
-def split(x: Any) -> tuple[Any, Any]:
-    """m and e of x = m 2^e with 1 <= m < 2, for x > 0 and not subnormal; anything else for other numbers."""
+def split(x: Any) -> tuple[Any, Any, Any]:
+    """m, e and 2^-e of x = m 2^e with 1 <= m < 2, for 2^-1022 <= x < 2^1023; anything else for other numbers."""
     m, e = np.frexp(x)
-    return 2.0 * m, e - 1.0
+    return 2.0 * m, e - 1.0, np.ldexp(2.0, -e)
 
 
 def _function(own: Any, name: str, arguments: int) -> None:
@@ -252,7 +252,7 @@ _function(copysign, "copysign", 2)
 
 @type_callable(split)
 def _type_of_split(_: Any) -> Any:
-    return lambda x: types.UniTuple(NUMBERS if x is NUMBERS else types.float64, 2) if is_number(x) else None
+    return lambda x: types.UniTuple(NUMBERS if x is NUMBERS else types.float64, 3) if is_number(x) else None
 
 
 @lower_builtin(split, types.Any)
@@ -267,6 +267,9 @@ def _split(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     bits = builder.bitcast(x, whole)
     m = builder.or_(builder.and_(bits, constant((1 << 52) - 1, whole)), constant(1023 << 52, whole))
     # a whole number below 2^52 behind the exponent of 2^52 is that number, more 2^52
-    e = builder.or_(builder.lshr(bits, constant(52, whole)), constant(1075 << 52, whole))
+    raised = builder.lshr(bits, constant(52, whole))
+    e = builder.or_(raised, constant(1075 << 52, whole))
     e = builder.fsub(builder.bitcast(e, x.type), constant(2.0**52 + 1023.0, x.type))
-    return context.make_tuple(builder, signature.return_type, (builder.bitcast(m, x.type), e))
+    inverse = builder.shl(builder.sub(constant(2046, whole), raised), constant(52, whole))
+    parts = builder.bitcast(m, x.type), e, builder.bitcast(inverse, x.type)
+    return context.make_tuple(builder, signature.return_type, parts)

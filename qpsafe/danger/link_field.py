@@ -51,9 +51,9 @@ def _near(w0: Vector, w1: Vector, d: Vector, motion: Motion, k: Vector) -> tuple
     wn = choose(R0 < R1, add(w0, t0, u), add(w1, t1, u))  # w⊥, from the nearer end
     hh, ww = dot(wn, wn), dot(w0, w1)
     # D = R0 R1 + w0·w1 and e = ŵ0 + ŵ1 = w⊥ σ/(R0 R1) - u (t0+t1) D/(R0 R1 σ), without cancellation
-    D = where(ww >= 0.0, R0 * R1 + ww, L * L * hh / (R0 * R1 - ww))
-    iD, i01 = 1.0 / D, i0 * i1
-    e = add(scale(sigma * i01, wn), -(t0 + t1) * D * i01 / sigma, u)
+    over, under = where(ww >= 0.0, R0 * R1 + ww, L * L * hh), where(ww >= 0.0, 1.0, R0 * R1 - ww)  # D = over/under
+    iD, i01 = under / over, i0 * i1
+    e = add(scale(sigma * i01, wn), -(t0 + t1) * over * i01 / (sigma * under), u)
     # S = log1p(L (σ+L)/D)/L, ∇S = -e/D
     S = log1p(L * (sigma + L) * iD) * iL
     dS = scale(-iD, e)

@@ -16,10 +16,11 @@ Motion = tuple[float, Vector, Vector, Vector, float, float, float, float, float]
 @inline
 def motion_of(v0: Vector, v1: Vector) -> Motion:
     """Return what depends on the velocities alone; K1 and K2 are homogeneous in them."""
-    speed = sqrt(dot(v0, v0)) + sqrt(dot(v1, v1))
+    V0, V1 = sqrt(dot(v0, v0)), sqrt(dot(v1, v1))
+    speed = V0 + V1
     share = 1.0 / where(speed > 0.0, speed, 1.0)
-    v0, v1 = scale(share, v0), scale(share, v1)
-    V0, V1, delta, vv = sqrt(dot(v0, v0)), sqrt(dot(v1, v1)), add(v1, -1.0, v0), dot(v0, v1)
+    v0, v1, V0, V1 = scale(share, v0), scale(share, v1), share * V0, share * V1
+    delta, vv = add(v1, -1.0, v0), dot(v0, v1)
     # Dv = V0 V1 + v0·v1 without cancellation
     x, alpha = cross(v0, v1), dot(delta, delta)
     Dv = where(vv < 0.0, dot(x, x) / (V0 * V1 - vv), V0 * V1 + vv)
@@ -54,7 +55,7 @@ def pole_integral(lam: float, lam1: float, mu: float, Q: Vector, V0: float, V1: 
     angle = atan2(fi * gr - fr * gi, fr * gr + fi * gi)
     angle = where((fi > 0.0) & (gi < 0.0) & (angle < 0.0), angle + 2.0 * pi, angle)
     angle = where((fi < 0.0) & (gi > 0.0) & (angle > 0.0), angle - 2.0 * pi, angle)
-    size = log(2.0 * Dv * sqrt(zz * zz1) / YY)
+    size = 0.5 * log((4.0 * Dv * Dv) * (zz * zz1) / (YY * YY))
     # I = ∫ dl/((l-z) |v_l|) = Ψ/ζ = -2 artanh(ζ/X)/ζ
     r0 = 1.0 / modulus
     Ir, Ii = (size * zr + angle * zi) * r0, (angle * zr - size * zi) * r0
@@ -78,7 +79,8 @@ def speed_potential(lam: float, lam1: float, mu: float, Q: Vector, V0: float, V1
     zz, zz1 = lam * lam + mu * mu, lam1 * lam1 + mu * mu
     Ir, Ii, re, im = pole_integral(lam, lam1, mu, Q, V0, V1, Dv)
     # ∂F/∂λ = Im Φ'/μ, ∂F/∂μ = (Re Φ' - A - F)/μ with Φ' - A = (vλ·δ + iμα) I + V1/(z-1) - V0/z
-    n0, n1, m = V0 / zz, V1 / zz1, 1.0 / mu
+    share = 1.0 / (zz * zz1 * mu)
+    n0, n1, m = V0 * (share * zz1 * mu), V1 * (share * zz * mu), share * zz * zz1
     F = (re * Ii + im * Ir) * m
     axial = b * Ii * m + alpha * Ir - n1 + n0
     radial = (b * Ir - mu * alpha * Ii + n1 * lam1 - n0 * lam - F) * m * m
