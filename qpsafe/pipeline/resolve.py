@@ -24,7 +24,7 @@ from qpsafe.limits import JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.pipeline.resolved import Resolved
-from qpsafe.recovery.returning import Led
+from qpsafe.recovery.returning import Led, is_plain
 from qpsafe.sensing.detection import reals
 from qpsafe.tasks.task import PoseTask
 
@@ -170,12 +170,7 @@ class Resolve:
             task, sample = self.parts[0][k], samples[k]
             if self._rows[k] is not None:
                 pose, twist = sample.pose, sample.twist
-                if (
-                    type(pose) is type(twist) is np.ndarray
-                    and pose.dtype == twist.dtype == _FLOAT
-                    and pose.shape == (4, 4)
-                    and twist.shape == (6,)
-                ):
+                if is_plain(pose, twist):
                     self._goals[k], self._twists[k], self._standing[k] = pose, twist, 0.0
                     continue
             self._standing[k] = 1.0

@@ -22,7 +22,7 @@ from qpsafe.recovery.return_kernel import (
 )
 from qpsafe.robot.state import RobotState
 from qpsafe.tasks.task import PoseTask, Task
-from qpsafe.tasks.trajectory import Sample
+from qpsafe.tasks.trajectory import FixedPose, Sample
 
 if TYPE_CHECKING:
     from qpsafe.recovery.returns import RecoveryRules
@@ -76,6 +76,12 @@ class Returns:
         #: Which tasks have to come back.
         self.pending = [False] * count
         self._ours = [_is_ours(task) for task in tasks]
+        #: Samples that are the same at every tick; they stand in what the references of a tick begin as.
+        self._still: list[Sample | None] = [None] * count
+        self._goals, self._twists = np.zeros((count, 4, 4)), np.zeros((count, 6))
+        for k, task in enumerate(tasks):
+            if self._ours[k] and type(task.trajectory) is FixedPose:
+                self._goals[k], self._twists[k] = self._still[k] = task.trajectory.sample(0.0)
         self._kinds = np.array([_kind_of(task) + (6 << SIZE) for task in tasks], dtype=np.int64)
         self._sizes = [6] * count
         self._marks = np.zeros((count, 3), dtype=np.int64)
@@ -147,22 +153,17 @@ class Returns:
             ValueError: A reference is not finite; nothing has changed.
         """
         count = len(samples)
-        goals, twists = np.empty((count, 4, 4)), np.empty((count, 6))
+        goals, twists = self._goals.copy(), self._twists.copy()
         asked: dict[int, tuple[Any, Array, int]] = {}
         plain, active = type(state) is RobotState, 0
-        for k, (sample, ours) in enumerate(zip(samples, self._ours, strict=True)):
+        for k, (sample, still) in enumerate(zip(samples, self._still, strict=True)):
             if activations[k] >= 1.0:
                 active |= 1 << k
-            if ours and plain and type(sample) is Sample:
-                pose, twist = sample
-                if (
-                    type(pose) is type(twist) is np.ndarray
-                    and pose.dtype == twist.dtype == _FLOAT
-                    and pose.shape == (4, 4)
-                    and twist.shape == (6,)
-                ):
-                    goals[k], twists[k] = pose, twist
-                    continue
+            if plain and sample is still:
+                continue
+            if plain and self._ours[k] and type(sample) is Sample and is_plain(*sample):
+                goals[k], twists[k] = sample
+                continue
             asked[k] = self._ask(k, sample.slowed(share) if share != 1.0 else sample, state)
             goals[k], twists[k] = 0.0, 0.0
         if plain and state.robot is not self._robot:
@@ -220,6 +221,16 @@ class Returns:
             if ours:
                 self._frames[0][k], self._frames[1][k] = robot.mounting(task.frame)  # type: ignore[attr-defined]
         self._robot = robot
+
+
+def is_plain(pose: Any, twist: Any) -> bool:
+    """Whether compiled code may take a reference pose and twist as they are: arrays of float64, of their shapes."""
+    return (
+        type(pose) is type(twist) is np.ndarray
+        and pose.dtype == twist.dtype == _FLOAT
+        and pose.shape == (4, 4)
+        and twist.shape == (6,)
+    )
 
 
 def return_numbers(rules: RecoveryRules, dt: float) -> tuple[float, ...]:
