@@ -67,6 +67,7 @@ class Resolve:
         self._kind = kind_of(law, len(tasks))
         *damping, importance = numbers_of(law, len(tasks)) if self._kind != OTHER else (0.0, 0.0, ())
         self._numbers = (*damping, np.array(importance))
+        self._damping = self._numbers[:2] if self._kind == STRICT else _NO_LAW
         if self._kind in (PAPER, NULLSPACE, WEIGHTED):
             from qpsafe.pipeline.law_kernel import law_tick  # not compiled for the strict law
 
@@ -82,7 +83,9 @@ class Resolve:
         ]
         self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
         self._weighed: tuple[Any, list[float]] = (), []  # the last activations, and what they weigh
-        self._layouts: dict[tuple[int, ...], tuple[Any, ...]] = {}
+        self._most[:] = np.inf
+        self._stood, self._held = False, self.most  # whether tasks' rows stand in the block; what speeds are in it
+        self._layouts: dict[tuple[int, tuple[int, ...]], tuple[Any, ...]] = {}
 
     def __call__(
         self, state: RobotState, qd: Array, before: Array, samples: Sequence[Any], qd0: Array,
@@ -112,11 +115,11 @@ class Resolve:
             if self._kind != NULLSPACE and len(soft) <= MOST_SOFT:  # projections know no inequalities
                 count = sum(level.rows for level in soft)
         room = -(-count // _ROOM) * _ROOM
-        made = self._layouts.get((room, *counts))
+        made = self._layouts.get((room, counts))
         if made is None:
             if len(self._layouts) >= MOST_LAYOUTS:  # a task whose rows change for ever
                 self._layouts.clear()
-            made = self._layouts[(room, *counts)] = self._laid_out(counts, room)
+            made = self._layouts[(room, counts)] = self._laid_out(counts, room)
         rows, layout, sizes = made
         if count:
             layout.fill(soft)
@@ -132,11 +135,13 @@ class Resolve:
                 cut.bounds[0], cut.bounds[1] = box.lower, box.upper
                 cut.codes[0], cut.codes[1], cut.codes[2] = box.lower_kind, box.upper_kind, box.sacrificed
         table, return_speed = (limits.table, limits.return_speed) if plain else (_NO_LIMITS, 0.0)  # type: ignore[union-attr]
-        self._qd0[:], self._most[:] = qd0, np.inf if self.most is None else self.most
+        self._qd0[:] = qd0
+        if self.most is not self._held:
+            self._most[:], self._held = np.inf if self.most is None else self.most, self.most
         if activations is not self._weighed[0] or type(activations) is not tuple:
             self._weighed = activations, weigh(activations, self._weights).tolist()
         weights = self._weighed[1]
-        damping = self._numbers[:2] if ours and self._kind == STRICT else (np.nan, np.nan)
+        damping = self._damping if ours else _NO_LAW
         excess, worst = resolve_tick(
             state.q, qd, state.memory, self._robot.tree.supports, self._robot.ends, *self._frames, rows, self._block,
             table, self._dt, return_speed, *damping, *layout, floats, integers, command,
@@ -160,8 +165,10 @@ class Resolve:
         """Take the references of tasks on poses, ask the other tasks; rows of each, and the others' answers."""
         asked: dict[int, Clik] = {}
         left: Sequence[int] = range(len(self._rows))
+        if self._stood:
+            self._standing[:], self._stood = 0.0, False
         if type(samples) is Led:  # what is led on a pose at once
-            self._goals[:], self._twists[:], self._standing[:] = samples.goals, samples.twists, 0.0
+            self._goals[:], self._twists[:] = samples.goals, samples.twists
             left = sorted({*samples.asked, *self._others}) if samples.asked else self._others
             if not left:
                 return self._counts, asked
@@ -171,9 +178,9 @@ class Resolve:
             if self._rows[k] is not None:
                 pose, twist = sample.pose, sample.twist
                 if is_plain(pose, twist):
-                    self._goals[k], self._twists[k], self._standing[k] = pose, twist, 0.0
+                    self._goals[k], self._twists[k] = pose, twist
                     continue
-            self._standing[k] = 1.0
+            self._standing[k], self._stood = 1.0, True
             asked[k] = task.clik(state, sample)
             counts[k] = len(asked[k].velocity)
         return tuple(counts), asked
@@ -222,4 +229,5 @@ class Resolve:
 
 
 _NO_LIMITS = np.empty((0, 0))
+_NO_LAW = np.nan, np.nan  # in the same compiled call
 _ROOM = 16  # memory is made for soft rows by so many
