@@ -243,9 +243,11 @@ class SafetyController(Running):
             gated = gate(self._q, self._qd, command, people, old, leads, len(people) > 0)
         messages = () if resolved.fine(limits) else judged(resolved, self._robot.joint_names, command)
         messages = (*stall.messages, *messages, *gated.notes, *seen.notes, *self._units.notes(distances, points))
-        status, off_path = DEGRADED if messages else OK, None if recovery.on_path else recovery.errors(commanded, samples)
-        reference, f = self._reference(command), switches[1] if len(switches) > 1 else 1.0
+        status, off_path = DEGRADED if messages else OK, None
+        if not recovery.on_path:
+            off_path = recovery.errors(commanded, samples)
         messages = (*doubts, *messages)  # doubts about the model are no fault of this tick
+        reference, f = self._reference(command), switches[1] if len(switches) > 1 else 1.0
         events, names = recovery.due_events(), self._robot.joint_names
         return Tick(  # its fields in their order: given by name, they take three times as long
             reference, cdf_n, switches[0], f, activations, regime, recovery.phase, status, messages, 0.0,

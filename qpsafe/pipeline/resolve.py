@@ -84,7 +84,8 @@ class Resolve:
         self._frames = np.array([b for b, _ in mountings], dtype=np.int64), np.array([place for _, place in mountings])
         self._weighed: tuple[Any, list[float]] = (), []  # the last activations, and what they weigh
         self._most[:] = np.inf
-        self._stood, self._held = False, self.most  # whether tasks' rows stand in the block; what speeds are in it
+        self._held: Array | None = None  # the largest speeds that the block has
+        self._stood = False  # whether rows of a task are marked in it as standing already
         self._layouts: dict[tuple[int, tuple[int, ...]], tuple[Any, ...]] = {}
 
     def __call__(

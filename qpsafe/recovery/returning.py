@@ -156,10 +156,10 @@ class Returns:
         goals, twists = self._goals.copy(), self._twists.copy()
         asked: dict[int, tuple[Any, Array, int]] = {}
         plain, active = type(state) is RobotState, 0
-        for k, (sample, still) in enumerate(zip(samples, self._still, strict=True)):
+        for k, sample in enumerate(samples):
             if activations[k] >= 1.0:
                 active |= 1 << k
-            if plain and sample is still:
+            if plain and sample is self._still[k] is not None:
                 continue
             if plain and self._ours[k] and type(sample) is Sample and is_plain(*sample):
                 goals[k], twists[k] = sample

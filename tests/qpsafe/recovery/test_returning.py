@@ -12,6 +12,7 @@ import qpsafe
 from qpsafe.recovery.recovery import Recovery
 from qpsafe.tasks.errors import TaskErrors
 from qpsafe.tasks.moves import Line
+from qpsafe.tasks.trajectory import FixedPose, Sample
 
 DT = 0.004
 
@@ -23,12 +24,31 @@ class Asked(qpsafe.FrameTask):
         return super().offset(value, sample)
 
 
-def ways(robot: Any, kinds: tuple[Any, ...], rules: qpsafe.RecoveryRules) -> list[Any]:
+class Same:
+    """A fixed pose that compiled code does not know to be one: other arrays at every tick."""
+
+    def __init__(self, pose: np.ndarray) -> None:
+        self.pose = pose
+
+    def sample(self, t: float) -> Any:
+        return Sample(self.pose.copy(), np.zeros(6))
+
+
+class Lost(Same):
+    """It gives nothing any more."""
+
+    lost = False
+
+    def sample(self, t: float) -> Any:
+        return None if self.lost else super().sample(t)
+
+
+def ways(robot: Any, kinds: tuple[Any, ...], rules: qpsafe.RecoveryRules, path: Any = None) -> list[Any]:
     """References and clocks of tasks of these kinds on the way of a robot that is pushed away and left alone."""
     start = robot.pose("tcp", robot.home)
     goal = start.copy()
     goal[:3, 3] += 0.1, 0.05, -0.1
-    path = Line(start, goal)
+    path = Line(start, goal) if path is None else path
     tasks = [kind("tcp", path, rows=rows) for kind, rows in zip(kinds, ((0, 1, 2), (3, 4, 5)), strict=True)]
     recovery, rng, told, q = Recovery(tasks, 9.775, DT, rules), np.random.default_rng(3), [], robot.home
     for k in range(400):
@@ -59,3 +79,20 @@ def test_a_task_that_is_asked_is_led_back_as_one_that_is_not(irb140: Any, rules:
             assert one[:2] == other[:2]
             for a, b in zip(one[2:], other[2:], strict=True):
                 np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
+
+
+def test_a_pose_that_is_known_to_stand_still_is_led_back_as_one_that_is_looked_at_anew(irb140: Any) -> None:
+    pose, kinds = irb140.pose("tcp", irb140.home), (qpsafe.FrameTask, qpsafe.FrameTask)
+    known, looked_at = (ways(irb140, kinds, qpsafe.RecoveryRules(), path(pose)) for path in (FixedPose, Same))
+    for one, other in zip(known, looked_at, strict=True):
+        assert one[:2] == other[:2]
+        assert all(np.array_equal(a, b) for a, b in zip(one[2:], other[2:], strict=True))
+
+
+def test_what_gives_no_sample_is_taken_for_no_pose_that_stands_still(irb140: Any) -> None:
+    path = Lost(irb140.pose("tcp", irb140.home))
+    recovery, state = Recovery([qpsafe.FrameTask("tcp", path)], 9.775, DT), irb140.at(irb140.home)
+    recovery.update(20.0, state, (0.0,))
+    path.lost = True
+    with pytest.raises(AttributeError):
+        recovery.update(20.0, state, (0.0,))
