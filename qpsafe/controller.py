@@ -284,5 +284,5 @@ class SafetyController(Running):
         self._seq = reference.seq
         self._qd_before, self._qd = self._qd, reference.qd.copy()
         self._q = reference.q.copy()
-        self._q.flags.writeable = False  # tasks of any kind will see it
+        self._q.setflags(write=False)  # tasks of any kind will see it
         self._recovery.pass_events()

@@ -148,7 +148,7 @@ class Activation(Fixed):
         n = len(self.levels)
         self._names = REGIME_NAMES.get(n, ("high", *(f"medium-{kept}" for kept in range(1, n)), "low"))
         self._plain = all(type(threshold) is Threshold for threshold in self.levels)
-        self._numbers = [(level.start, level.end, level.delta, level.epsilon) for level in self.levels]
+        self._numbers = [(level, (level.start, level.end, level.delta, level.epsilon)) for level in self.levels]
         self._calm = Switching((1.0,) * n, (1.0,) * len(self.thresholds), self._names[-1])
         self._released = Switching((0.0,) * n, (0.0,) * len(self.thresholds), self._names[0])
         self._least, self._most = self.levels[-1].start, self.levels[0].end if self._plain else math.inf
@@ -196,14 +196,15 @@ class Activation(Fixed):
         if cdf_n >= self._most:  # beyond the highest one
             return self._released
         switches, kept = [], 0
-        for level, numbers in zip(self.levels, self._numbers, strict=True):
+        for level, numbers in self._numbers:
             if cdf_n <= numbers[0]:
                 switches.append(1.0)
                 kept += 1
             else:
                 switches.append(switch(cdf_n, *numbers) if self._plain else level(cdf_n))
         activations = multiply(switches, self.counts, [1.0] * len(self.thresholds))
-        return Switching(tuple(switches), tuple(activations), self._names[kept])
+        # without a detour through Python
+        return tuple.__new__(Switching, (tuple(switches), tuple(activations), self._names[kept]))
 
     def kept(self, cdf_n: float) -> int:
         """Number of tasks not yet being released: N in low danger, 0 in high danger."""

@@ -184,9 +184,10 @@ class Sense:
         capped = severity != CLEAR
         if self._ranging is not None:
             capped, notes = self._with(capped, notes, more, sensing.unseen)
-        seen = Seen(
-            points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, capped, *more[2:4]
-        )
+        seen = tuple.__new__(Seen, (  # without a detour through Python
+            points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, capped, more.near,
+            more.leads,
+        ))  # fmt: skip
         return self._ended(seen, self._work, count if sensing.rules.velocities else 0, self._speeds)
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
