@@ -143,15 +143,18 @@ def _largest(along: float, b: float, turning: float, distance: float, u: float) 
 
 
 @inline
-def _hot(t: Any, v: Array, ages: Array, away: Array, hot: Index) -> int:
-    """Pairs that have to be looked at along the way of a command, into `hot`; returns how many."""
-    n, points, dt, count = v.shape[0], ages.shape[0], t.numbers[DT], 0
+def _hot(t: Any, w: Any, v: Array) -> int:
+    """Pairs that have to be looked at along the way of a command, into `w.hot`; returns how many."""
+    n, points, dt, count, ages, away, hot = v.shape[0], w.ages.shape[0], t.numbers[DT], 0, w.ages, w.away, w.hot
+    ways, times = w.there, w.speeds  # of the joints until they stand
+    for j in range(n):
+        ways[j], times[j] = abs(covered(v[j], t.acceleration[j], dt, 1e9)), ticks_of(v[j], t.acceleration[j], dt)
     for c in range(t.radii.shape[0]):
-        sweep, ticks = 0.0, 0
+        sweep, ticks = 0.0, 0.0
         for j in range(n):
             if t.levers[c, j] > 0.0:
-                ticks = max(ticks, ticks_of(v[j], t.acceleration[j], dt))
-                sweep += t.levers[c, j] * abs(covered(v[j], t.acceleration[j], dt, 1e9))
+                ticks = max(ticks, times[j])
+                sweep += t.levers[c, j] * ways[j]
         if sweep == 0.0:
             continue
         reach = t.radii[c] + t.numbers[NEAR] + t.numbers[PERSON] * ticks * dt + sweep
@@ -177,7 +180,7 @@ def people_excess(t: Any, w: Any, q: Array, v: Array, points: Array, enough: flo
     The first capsule and point concerned are left in `w.worst`.
     """
     n, p, dt, v_s = q.shape[0], points.shape[0], t.numbers[DT], t.numbers[APPROACH]
-    count = _hot(t, v, w.ages, w.away, w.hot)
+    count = _hot(t, w, v)
     excess, tick, person = 0.0, 0, t.numbers[PERSON]
     while count > 0:
         if not may_look(w):

@@ -23,7 +23,7 @@ from qpsafe.geometry.clearance_work import MOST, cut_rows
 from qpsafe.geometry.layout import BALL, BODY, FLOATS, INTEGERS, SPHERE, VERTEX
 from qpsafe.geometry.nearness import apart, cut_tables, shape_pose
 from qpsafe.geometry.pairs import measured
-from qpsafe.geometry.reach import along_normal, passes, prepare, reach
+from qpsafe.geometry.reach import along_normal, look_ahead, passes, prepare, reach
 from qpsafe.geometry.separation import WORK
 from qpsafe.geometry.support import support
 from qpsafe.robot.kinematics import Index, cut, place
@@ -209,7 +209,7 @@ def clearance_rows(
     poses, twists = cut(memory, n, integers[1])[:2]
     r.marks[0] = r.marks[1] = 0
     prepare(t, r, poses, twists, qd, limits, dt)
-    margin = t.numbers[0]
+    margin, ahead = t.numbers[0], False
     for group in range(t.groups.shape[0]):
         a, b, first, count, shape = (
             t.groups[group, 0], t.groups[group, 1], t.groups[group, 2], t.groups[group, 3], t.groups[group, 4],
@@ -236,6 +236,9 @@ def clearance_rows(
                     continue
             elif passes(t, r, twists, qd, a, shape, c, t.shapes[i, BALL + 3], margin):
                 continue
+            if not ahead:  # seldom needed
+                look_ahead(r, qd, limits, dt)
+                ahead = True
             _pair_rows(t, r, poses, twists, qd, pair, within, dt)
             if r.marks[1] == DEEP:
                 return r.marks[0]

@@ -26,18 +26,25 @@ def braking_way(v: float, a: float, dt: float, ticks: float) -> float:
 
 
 @inline
+def look_ahead(r: Any, qd: Array, limits: Array, dt: float) -> None:
+    """Where the joints are, on the way of a robot that brakes, at `LOOKS` times."""
+    last = 1.0
+    for j in range(qd.shape[0]):
+        last = max(last, abs(qd[j]) / r.steps[j] + 1.0)
+    for i in range(LOOKS):
+        for j in range(qd.shape[0]):
+            way = braking_way(abs(qd[j]), limits[3, j], dt, (i + 1) * last / LOOKS)
+            r.ahead[i, j] = way if qd[j] >= 0.0 else -way
+
+
+@inline
 def prepare(t: Any, r: Any, poses: Array, twists: Array, qd: Array, limits: Array, dt: float) -> None:
     """Ways of the joints that brake, how far each body can come until it stands, and balls."""
-    n, last = qd.shape[0], 1.0
+    n = qd.shape[0]
     for j in range(n):
         v, a = abs(qd[j]), limits[3, j]
         r.steps[j] = step = a * dt
         r.far[j], r.back[j] = braking_way(v + step, a, dt, inf), max(step - v, 0.0) * dt
-        last = max(last, v / step + 1.0)
-    for i in range(LOOKS):
-        for j in range(n):
-            way = braking_way(abs(qd[j]), limits[3, j], dt, (i + 1) * last / LOOKS)
-            r.ahead[i, j] = way if qd[j] >= 0.0 else -way
     for b in range(1, n + 1):
         c = place(poses[b], t.balls[b, 0], t.balls[b, 1], t.balls[b, 2])
         r.balls[b, 0], r.balls[b, 1], r.balls[b, 2] = c
