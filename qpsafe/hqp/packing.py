@@ -35,7 +35,7 @@ class Packed(NamedTuple):
     low: Array
     high: Array
     weight: Array | None
-    counts: Sequence[int]
+    counts: tuple[int, ...]
     box_low: Array
     box_high: Array
     hard: bool
@@ -72,8 +72,8 @@ def pack(
                 matrix = np.concatenate(matrices, dtype=_FLOAT, casting="no")
                 low = np.concatenate(lows, dtype=_FLOAT, casting="no")
                 high = low if hard is None else np.concatenate(highs)
-                counts = list(map(len, matrices))
-                plain = counts == list(map(len, lows)) and matrix.ndim == 2 and low.ndim == 1
+                counts = tuple(map(len, matrices))
+                plain = counts == tuple(map(len, lows)) and matrix.ndim == 2 and low.ndim == 1
         except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
             pass
     if not plain:
@@ -89,7 +89,7 @@ def pack(
     return tuple.__new__(Packed, (matrix, low, high, weight, counts, box_low, box_high, rows is not None))
 
 
-def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, list[int]]:
+def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, tuple[int, ...]]:
     """Matrix, bounds, weights (None if nobody has any) and number of rows of a list of levels."""
     matrices, lows, highs, counts = [], [], [], []
     equal = plain = True
@@ -108,7 +108,7 @@ def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, list
     # arrays whose shape was changed in place? compiled code trusts it
     if not len(matrix) == len(low) == len(high) == len(low if weight is None else weight):
         raise ConfigurationError("solve_hierarchy", "levels", levels, "levels as they were made")
-    return matrix, low, high, weight, counts
+    return matrix, low, high, weight, tuple(counts)
 
 
 def _hard(rows: Any) -> Level:
@@ -129,7 +129,7 @@ def _without_levels(lower: ArrayLike | None, upper: ArrayLike | None) -> Packed:
         raise ConfigurationError("solve_hierarchy", key, given, expected)
     box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
     box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
-    return Packed(np.empty((0, n)), np.empty(0), np.empty(0), None, [], box_low, box_high, False)
+    return Packed(np.empty((0, n)), np.empty(0), np.empty(0), None, (), box_low, box_high, False)
 
 
 def unpack(problem: Packed) -> list[Level]:

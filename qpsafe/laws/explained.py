@@ -129,11 +129,11 @@ def under(s: Solved, A: Array, target: Array, counts: list[int]) -> Packed:
         counts: Rows of each.
     """
     if not s.soft:
-        return Packed(A, target, target, None, counts, s.lower, s.upper, False)
+        return Packed(A, target, target, None, tuple(counts), s.lower, s.upper, False)
     low = np.concatenate([*(level.lower for level in s.soft), target])
     high = np.concatenate([*(level.upper for level in s.soft), target])
     A = np.concatenate([*(level.A for level in s.soft), A])
-    return Packed(A, low, high, None, [*(level.rows for level in s.soft), *counts], s.lower, s.upper, False)
+    return Packed(A, low, high, None, (*(level.rows for level in s.soft), *counts), s.lower, s.upper, False)
 
 
 def paper_hierarchy(s: Solved, kept: int) -> Packed:

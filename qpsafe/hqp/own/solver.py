@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,16 +37,16 @@ solve = entry(_SIGNATURE, *MODULES)(run)
 solve_compiled = linked(solve, *MODULES)
 """`solve` for compiled code."""
 _NO_WEIGHTS = np.empty(0)
-_memory: dict[tuple[int, ...], tuple[Array, Index, int, Index, Array]] = {}
+_memory: dict[tuple[int, tuple[int, ...]], tuple[Array, Index, int, Index, Array]] = {}
 
 
-def _layout(n: int, counts: Sequence[int]) -> tuple[Array, Index, int, Index, Array]:
+def _layout(n: int, counts: tuple[int, ...]) -> tuple[Array, Index, int, Index, Array]:
     """Workspace for levels of `counts` rows; kept, because its contents matter during a call only (under the GIL)."""
     if len(_memory) >= 64:
         _memory.clear()
     m = max(n, *counts) if counts else n
     memory = (*workspace(n, sum(counts), m), m, np.cumsum(counts, dtype=np.int64), np.zeros(len(counts)))
-    _memory[(n, *counts)] = memory
+    _memory[(n, counts)] = memory
     return memory
 
 
@@ -63,7 +62,7 @@ def solve_packed(problem: Packed, damping: Array | None = None) -> tuple[Array, 
     """
     A, low, high, weight, counts, box_low, box_high, hard = problem
     n = box_low.shape[0]
-    floats, integers, m, ends, undamped = _memory.get((n, *counts)) or _layout(n, counts)
+    floats, integers, m, ends, undamped = _memory.get((n, counts)) or _layout(n, counts)
     x = np.zeros(n)
     info = np.zeros(HEADER + n + A.shape[0], np.int64)
     weights = _NO_WEIGHTS if weight is None else weight
