@@ -80,7 +80,7 @@ class Gate(Fixed):
         share = let_through(
             *self.blocks, self._known, *self._work, q, qd, command, points, ages, leads, measured, self._told
         )  # fmt: skip
-        return PASSED if share == 1.0 and self._told[CAUSE] == 0.0 else self._words()
+        return PASSED if share == 1.0 and self._told.item(CAUSE) == 0.0 else self._words()
 
     def hold(self, state: RobotState, qd: Array, points: Array, ages: Array, leads: Array = NO_AGES) -> Array | None:
         """Largest speeds of joints (n,) [rad/s] that must stand before a link is touched; infinite for the others.

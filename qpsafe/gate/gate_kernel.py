@@ -89,7 +89,7 @@ def let_through(
     known = view(own, 0, (g, 1 + n))
     told[SHARE], told[CAUSE], told[WHO], told[POINT], told[SHORT] = 1.0, 0.0, -1.0, -1.0, 0.0
     w.worst[LEFT] = LOOKS
-    if measured == 0:
+    if measured == 0 and points.shape[0] > 0:
         stand(t, q, w.none, w.nowhere, w.memory)
         look(t, w, w.memory, points, ages, leads)
     slow_down(qd, t.acceleration, t.numbers[DT], w.brake)
