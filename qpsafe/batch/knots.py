@@ -52,7 +52,7 @@ class Path(NamedTuple):
     events: tuple[tuple[float, str], ...]
 
 
-@entry(types.void(types.float64[:, ::1]), clik, offset)
+@entry(types.void(types.float64[:, ::1]), clik, offset, code)
 def _link(knots: Array) -> None:
     """Fill in how each knot turns to the next one."""
     for k in range(knots.shape[0] - 1):
@@ -66,7 +66,7 @@ def _link(knots: Array) -> None:
 _read, _rows = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.float64, 2, "C", readonly=True)
 
 
-@entry(types.void(_read, _rows, _read, types.float64[:, :, ::1], types.float64[:, ::1]), reference_kernel, offset)
+@entry(types.void(_read, _rows, _read, types.float64[:, :, ::1], types.float64[:, ::1]), reference_kernel, offset, code)
 def _sample_knots(times: Array, knots: Array, at: Array, poses: Array, twists: Array) -> None:
     for k in range(at.shape[0]):
         interpolate(times, knots, at[k], poses[k], twists[k])

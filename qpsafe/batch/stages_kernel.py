@@ -45,7 +45,7 @@ from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
 from qpsafe.sensing import detection, readings, speed_cap, units
 from qpsafe.sensing.speed_cap import fastest
-from qpsafe.tasks import clik, offset
+from qpsafe.tasks import clik, joint, offset
 from qpsafe.tasks.joint import TURN
 
 _sense_readings = linked(sense_readings, *sense_kernel.USES, readings, *readings.USES)
@@ -61,7 +61,7 @@ USES = (
     code, blocks, cuts, recovery_kernel, reference_kernel, watch_kernel, reference_module, activation, hierarchical,
     limits_module, braking, resolve_kernel, sense_kernel, stall, steps, return_kernel, kinematics, speed_cap, units,
     clik, offset, detection, readings, damping, clearance_kernel, *clearance_kernel.USES, *resolve_kernel.USES,
-    regimes, law_kernel, *law_kernel.USES, *sense_kernel.USES, *readings.USES, *MODULES,
+    regimes, joint, law_kernel, *law_kernel.USES, *sense_kernel.USES, *readings.USES, *MODULES,
 )  # fmt: skip
 
 

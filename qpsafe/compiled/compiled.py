@@ -85,6 +85,10 @@ seconds: dict[str, float] = {}
 """Processor time [s] that compiling each kernel, or loading it from the cache, took in this process."""
 
 
+kernels: dict[str, tuple[Callable[..., Any], tuple[ModuleType, ...]]] = {}
+"""Each kernel's function, and the other modules that its name in the cache tells the state of."""
+
+
 def entry(
     types_: Any, *uses: ModuleType, nogil: bool = False, python: bool = True
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -102,6 +106,7 @@ def entry(
 
     def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         kernel = f"{function.__module__}.{function.__name__}"
+        kernels[kernel] = function, uses
         scopes = (function.__globals__, *map(vars, uses))
         calls = sorted({_linked[id(one)][0] for scope in scopes for one in scope.values() if id(one) in _linked})
         state = crc32(" ".join(calls).encode(), checksum(sys.modules[__name__], memory, *uses))
@@ -115,8 +120,8 @@ def entry(
     return compiled
 
 
-#: Where what was linked stands -> its name, and itself, which stays where it is.
-_linked: dict[int, tuple[str, Any]] = {}
+#: Where what was linked stands -> its name; itself, which stays where it is; the kernel, and what its name tells.
+_linked: dict[int, tuple[str, Any, Any, tuple[ModuleType, ...]]] = {}
 
 
 def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
@@ -149,7 +154,7 @@ def linked(compiled: Any, *uses: ModuleType) -> Callable[..., Any]:
     context = Parameter("typing_context", Parameter.POSITIONAL_OR_KEYWORD)
     call.__signature__ = Signature([context, *signature(function).parameters.values()])  # type: ignore[attr-defined]
     made = intrinsic(call)
-    _linked[id(made)] = name, made
+    _linked[id(made)] = name, made, compiled, uses
     return made
 
 

@@ -76,7 +76,7 @@ def to_axis(axis: Array, p: Vector) -> tuple[float, float]:
     x, y, z = p[0] - axis[0, 0], p[1] - axis[0, 1], p[2] - axis[0, 2]
     dd = dx * dx + dy * dy + dz * dz
     s = where(dd > 0.0, (x * dx + y * dy + z * dz) / dd, 0.0)
-    s = where(s > 0.0, where(s < 1.0, s, 1.0), 0.0)
+    s = where(s > 0.0, where(s < 1.0, s, 1.0), 0.0 * s)  # NaN stays
     x, y, z = x - s * dx, y - s * dy, z - s * dz
     return sqrt(x * x + y * y + z * z), s
 

@@ -29,10 +29,13 @@ from qpsafe.compiled.compiled import Array, entry, inline, readable, row
 from qpsafe.gate import braking_path, people_kernel, tables, workspace
 from qpsafe.gate.people_kernel import look, to_axis
 from qpsafe.gate.tables import CAPSULES, DT, ESCAPE, NEAR, PAIRS, PERSON, SHAPES
+from qpsafe.geometry import pairs
 from qpsafe.robot.kinematics import Index, cut
 
 #: All the code that goes into the kernel.
-USES = (reference_module, tables, workspace, braking_path, people_kernel, *people_kernel.USES)
+USES = (
+    reference_module, tables, workspace, braking_path, people_kernel, *people_kernel.USES, pairs, *pairs.USES,
+)  # fmt: skip
 _block, _whole = types.Array(types.float64, 1, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
 _out = types.float64[::1]
 

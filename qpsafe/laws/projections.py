@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from qpsafe.compiled.compiled import entry, inline, linked
 from qpsafe.compiled.memory import view
-from qpsafe.hqp.own import level, linear
+from qpsafe.hqp.own import level, linear, state
 from qpsafe.hqp.own.level import RANK
 from qpsafe.hqp.own.linear import along, jacobi
 from qpsafe.hqp.own.solver import read
@@ -37,7 +37,7 @@ Index = NDArray[np.int64]
 ROUNDING = 1e-15  # rows shorter than this, relative to the longest, and smaller cosines of angles are left alone
 SWEEPS = 20  # six are usual
 #: All the code that goes into the kernel.
-USES = (linear, level)
+USES = (linear, level, state)
 
 
 @inline

@@ -25,7 +25,7 @@ from qpsafe.laws.kinds import NULLSPACE, WEIGHTED
 from qpsafe.laws.nullspace import blend_compiled
 from qpsafe.laws.projections import regimes_compiled
 from qpsafe.laws.weighted import into_one_compiled
-from qpsafe.pipeline import resolve_kernel
+from qpsafe.pipeline import checks, resolve_kernel
 from qpsafe.pipeline.resolve_kernel import cut_given, cut_parts, layout_types, sent
 from qpsafe.robot.kinematics import Index
 
@@ -33,8 +33,8 @@ _one = types.Array(types.float64, 1, "C", readonly=True)
 _out, _out_ints = types.float64[::1], types.int64[::1]
 #: All the code that goes into the kernel.
 USES = (
-    resolve_kernel, limits_module, laws_damping, kinds, nullspace, projections, weighted, regimes, *projections.USES,
-    *MODULES,
+    resolve_kernel, checks, limits_module, laws_damping, kinds, nullspace, projections, weighted, regimes,
+    *projections.USES, *MODULES,
 )  # fmt: skip
 
 

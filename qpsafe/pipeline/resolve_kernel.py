@@ -23,6 +23,7 @@ from qpsafe.laws import yielding as laws_yielding
 from qpsafe.laws.damping import threshold_compiled
 from qpsafe.laws.yielding import yield_to
 from qpsafe.limits import JERK, KINDS, admit_into, box_into
+from qpsafe.pipeline import checks
 from qpsafe.pipeline.checks import ABSURD_STEP
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, cut
@@ -118,7 +119,7 @@ def given(block: Array, n: int, tasks: int) -> tuple[Any, ...]:
 cut_parts, cut_given = inline(parts), inline(given)
 STILLNESS = KINDS.index("stillness")
 #: All the code that goes into `resolve_tick`.
-USES = (kinematics, clik, limits_module, laws_damping, laws_yielding, regimes, *MODULES)
+USES = (kinematics, clik, limits_module, laws_damping, laws_yielding, regimes, checks, *MODULES)
 _one, _two, _three = (types.Array(types.float64, ndim, "C", readonly=True) for ndim in (1, 2, 3))
 _any, _ints, _out, _out_ints = readable(1), _one.copy(dtype=types.int64), types.float64[::1], types.int64[::1]
 #: Of a `Layout`.

@@ -159,8 +159,9 @@ class Returns:
         for k, sample in enumerate(samples):
             if activations[k] >= 1.0:
                 active |= 1 << k
-            if plain and sample is self._still[k] is not None:
-                continue
+            still = self._still[k]
+            if plain and still is not None and sample is still and not still.pose.flags.writeable:
+                continue  # else somebody may have changed it in place
             if plain and self._ours[k] and type(sample) is Sample and is_plain(*sample):
                 goals[k], twists[k] = sample
                 continue

@@ -27,6 +27,7 @@ from qpsafe.ranging.reduction.looking_kernel import (
     turned,
 )
 from qpsafe.ranging.reduction.nearest_kernel import keep_nearest, to_link
+from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index
 from qpsafe.sensing import hulls
 from qpsafe.sensing.hulls import within
@@ -47,7 +48,7 @@ _out, _outs, _whole = types.float64[::1], types.float64[:, ::1], types.int64[::1
         readable(1), _two, _two, _three, _ints, _ints, _two, _two, _outs, _outs, _whole, _outs, types.int64[:, ::1],
         types.int64, types.int64, types.int64, _outs, _outs, _whole,
     ),
-    hulls, looking_kernel, nearest_kernel,
+    hulls, kinematics, looking_kernel, nearest_kernel,
 )  # fmt: skip
 def reduce_zones(
     distances: Array,

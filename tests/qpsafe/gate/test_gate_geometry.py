@@ -15,6 +15,7 @@ from qpsafe.gate.braking_path import braked, covered, ticks_of
 from qpsafe.gate.capsules import capsules_of
 from qpsafe.gate.levers import levers
 from qpsafe.gate.pack import robot_capsules
+from qpsafe.gate.people_kernel import measure_all
 from qpsafe.sensing.body import body_hulls
 
 DT = 0.004
@@ -88,3 +89,33 @@ def test_no_joint_moves_a_point_faster_than_its_lever(name: str) -> None:
             assert speed <= bound[j] + 1e-5
             used[j] = max(used[j], speed / bound[j] if bound[j] > 0.0 else 0.0)
     assert (used > 0.3).all()  # no bound is a mere large number
+
+
+_distances = njit(lambda axes, points, away: measure_all(axes, points, away))
+_coordinate = st.one_of(st.floats(-3.0, 3.0), st.sampled_from([np.nan, np.inf, -np.inf, 0.0]))
+_place = st.tuples(_coordinate, _coordinate, _coordinate)
+
+
+@given(
+    points=st.lists(_place, min_size=1, max_size=20),
+    ends=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=2, max_size=2),
+)
+def test_distances_are_those_of_single_points_and_what_is_nowhere_is_not_near_and_not_far(
+    points: list[Any], ends: list[Any]
+) -> None:
+    axes, seen = np.array([ends, [ends[0], ends[0]]]), np.array(points)
+    away = np.full(len(axes) * len(seen) + 3, -1.0)
+    _distances(axes, seen, away)
+    assert (away[len(axes) * len(seen) :] == -1.0).all()
+    for axis, found in zip(axes, away[:-3].reshape(len(axes), -1), strict=True):
+        d = axis[1] - axis[0]
+        for p, distance in zip(seen, found, strict=True):
+            if np.isfinite(p).all():
+                s = np.clip((p - axis[0]) @ d / (d @ d), 0.0, 1.0) if d @ d > 0.0 else 0.0
+                assert distance == pytest.approx(float(np.linalg.norm(p - axis[0] - s * d)), abs=1e-12)
+                continue
+            assert not distance < np.inf
+            with np.errstate(invalid="ignore"):
+                along = (p - axis[0]) * d
+                nowhere = np.isnan(p).any() or (d @ d > 0.0 and np.isnan(along.sum()))
+            assert np.isnan(distance) or not nowhere

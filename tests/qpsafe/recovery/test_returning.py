@@ -96,3 +96,20 @@ def test_what_gives_no_sample_is_taken_for_no_pose_that_stands_still(irb140: Any
     path.lost = True
     with pytest.raises(AttributeError):
         recovery.update(20.0, state, (0.0,))
+
+
+def test_a_pose_that_somebody_changes_in_place_all_the_same_is_where_it_is_now(irb140: Any) -> None:
+    def goals(path: Any) -> list[np.ndarray]:
+        recovery, state = Recovery([qpsafe.FrameTask("tcp", path)], 9.775, DT), irb140.at(irb140.home)
+        told = []
+        for k in range(60):
+            if k == 20:
+                path.pose.flags.writeable = True
+                path.pose[1, 3] += 0.05
+            danger, active = (20.0, 0.0) if 5 <= k < 30 else (0.0, 1.0)
+            told.append(recovery.update(danger, state, (active,))[0].pose.copy())
+        return told
+
+    pose = irb140.pose("tcp", irb140.home)
+    for one, other in zip(goals(FixedPose(pose)), goals(Same(pose.copy())), strict=True):
+        np.testing.assert_array_equal(one, other)
