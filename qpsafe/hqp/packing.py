@@ -14,7 +14,7 @@ from qpsafe.text.given import numbers, parts
 
 Array = NDArray[np.float64]
 
-_FLOAT, _ARRAYS = np.dtype(np.float64), {np.ndarray}
+_FLOAT = np.dtype(np.float64)
 
 
 class Packed(NamedTuple):
@@ -62,18 +62,21 @@ def pack(
         return _without_levels(lower, upper)
     plain, weight = False, None
     if levels and type(levels[0]) is not Level:  # pairs (A, b), perhaps
+        matrices, lows, counts = ([], [], []) if hard is None else ([hard.A], [hard.lower], [hard.rows])
         try:
-            matrices, lows = zip(*levels, strict=True)  # type: ignore[arg-type]
-            if set(map(type, matrices + lows)) == _ARRAYS:  # concatenated, masks would be lost
-                highs = lows
-                if hard is not None:
-                    matrices, lows, highs = (hard.A, *matrices), (hard.lower, *lows), (hard.upper, *highs)
-                # nor are truth values numbers: "no" casting
+            for A, b in levels:  # type: ignore[misc]
+                # concatenated, masks would be lost, and lists be what they happen to become
+                if type(A) is not np.ndarray or type(b) is not np.ndarray or len(A) != len(b):
+                    break
+                matrices.append(A)
+                lows.append(b)
+                counts.append(len(A))
+            else:  # nor are truth values numbers: "no" casting
                 matrix = np.concatenate(matrices, dtype=_FLOAT, casting="no")
-                low = np.concatenate(lows, dtype=_FLOAT, casting="no")
-                high = low if hard is None else np.concatenate(highs)
-                counts = tuple(map(len, matrices))
-                plain = counts == tuple(map(len, lows)) and matrix.ndim == 2 and low.ndim == 1
+                low = high = np.concatenate(lows, dtype=_FLOAT, casting="no")
+                if hard is not None:
+                    high = np.concatenate([hard.upper, *lows[1:]])
+                plain = matrix.ndim == 2 and low.ndim == 1
         except (TypeError, ValueError):  # Levels among them, rows given as vectors, or mistakes
             pass
     if not plain:
@@ -86,10 +89,10 @@ def pack(
     box_low = np.full(n, -np.inf) if lower is None else _limit(lower, n, "lower")
     box_high = np.full(n, np.inf) if upper is None else _limit(upper, n, "upper")
     # what Packed(...) does, without its detour through Python
-    return tuple.__new__(Packed, (matrix, low, high, weight, counts, box_low, box_high, rows is not None))
+    return tuple.__new__(Packed, (matrix, low, high, weight, tuple(counts), box_low, box_high, rows is not None))
 
 
-def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, tuple[int, ...]]:
+def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, list[int]]:
     """Matrix, bounds, weights (None if nobody has any) and number of rows of a list of levels."""
     matrices, lows, highs, counts = [], [], [], []
     equal = plain = True
@@ -108,7 +111,7 @@ def _stack(levels: list[Level]) -> tuple[Array, Array, Array, Array | None, tupl
     # arrays whose shape was changed in place? compiled code trusts it
     if not len(matrix) == len(low) == len(high) == len(low if weight is None else weight):
         raise ConfigurationError("solve_hierarchy", "levels", levels, "levels as they were made")
-    return matrix, low, high, weight, tuple(counts)
+    return matrix, low, high, weight, counts
 
 
 def _hard(rows: Any) -> Level:
