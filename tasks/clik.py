@@ -33,6 +33,16 @@ class Clik(NamedTuple):
     error: NDArray[np.float64]
 
 
+def is_plain(pose: Any, twist: Any) -> bool:
+    """Whether compiled code may take a reference pose and twist as they are: arrays of float64, of their shapes."""
+    return (
+        type(pose) is type(twist) is np.ndarray
+        and pose.dtype == twist.dtype == _FLOAT
+        and pose.shape == (4, 4)
+        and twist.shape == (6,)
+    )
+
+
 def pose_clik(state: RobotState, frame: str, rows: Index, gain: float, sample: Any) -> Clik | None:
     """CLIK of rows of the pose of a frame, e = (x_d - x, log(R_d Rᵀ)) in world axes.
 
@@ -47,9 +57,7 @@ def pose_clik(state: RobotState, frame: str, rows: Index, gain: float, sample: A
         None where the sample is not made of plain arrays.
     """
     pose, twist = sample.pose, sample.twist
-    if not (type(pose) is type(twist) is np.ndarray and pose.dtype == twist.dtype == _FLOAT):
-        return None
-    if pose.shape != (4, 4) or twist.shape != (6,):
+    if not is_plain(pose, twist):
         return None
     robot = state.robot
     J, result = np.empty((len(rows), robot.nq)), np.empty((2, len(rows)))

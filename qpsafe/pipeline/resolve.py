@@ -24,8 +24,9 @@ from qpsafe.limits import JointLimits
 from qpsafe.pipeline.checks import check_command, checked_box, checked_velocity
 from qpsafe.pipeline.resolve_kernel import Parts, given, parts, resolve_tick, sizes_of
 from qpsafe.pipeline.resolved import Resolved
-from qpsafe.recovery.returning import Led, is_plain
+from qpsafe.recovery.returning import Led
 from qpsafe.sensing.detection import reals
+from qpsafe.tasks.clik import is_plain
 from qpsafe.tasks.task import PoseTask
 
 if TYPE_CHECKING:

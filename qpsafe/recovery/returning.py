@@ -21,6 +21,7 @@ from qpsafe.recovery.return_kernel import (
     lead_references,
 )
 from qpsafe.robot.state import RobotState
+from qpsafe.tasks.clik import is_plain
 from qpsafe.tasks.task import PoseTask, Task
 from qpsafe.tasks.trajectory import FixedPose, Sample
 
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from qpsafe.recovery.returns import RecoveryRules
 
 Array = NDArray[np.float64]
-_FLOAT = np.dtype(np.float64)
 _NONE = np.empty(0)
 
 
@@ -222,16 +222,6 @@ class Returns:
             if ours:
                 self._frames[0][k], self._frames[1][k] = robot.mounting(task.frame)  # type: ignore[attr-defined]
         self._robot = robot
-
-
-def is_plain(pose: Any, twist: Any) -> bool:
-    """Whether compiled code may take a reference pose and twist as they are: arrays of float64, of their shapes."""
-    return (
-        type(pose) is type(twist) is np.ndarray
-        and pose.dtype == twist.dtype == _FLOAT
-        and pose.shape == (4, 4)
-        and twist.shape == (6,)
-    )
 
 
 def return_numbers(rules: RecoveryRules, dt: float) -> tuple[float, ...]:
