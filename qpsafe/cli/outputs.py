@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +13,7 @@ import typer
 
 from qpsafe.errors import ConfigurationError
 
+_TRIES, _PAUSE = 50, 0.001  # of a folder that comes and goes [s]
 DRAWN = (".png", ".pdf", ".svg")
 """Endings of figures."""
 
@@ -51,20 +53,24 @@ def try_folder(where: str, key: str, path: Path) -> None:
     Raises:
         ConfigurationError: It cannot be made, or nothing can be written into it.
     """
-    made: list[Path] = []
-    try:
-        for folder in (*reversed(path.parents), path):
-            if not folder.exists():
-                folder.mkdir()
-                made.append(folder)
-        with NamedTemporaryFile(dir=path, prefix=".qpsafe-"):
-            pass
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(where, key, str(path), f"a folder to write into ({_reason(error)})") from None
-    finally:
-        with suppress(OSError):  # somebody else has put something there meanwhile
-            for folder in reversed(made):
-                folder.rmdir()
+    for left in reversed(range(_TRIES)):
+        made: list[Path] = []
+        try:
+            for folder in (*reversed(path.parents), path):
+                if not folder.exists():
+                    folder.mkdir()
+                    made.append(folder)
+            with NamedTemporaryFile(dir=path, prefix=".qpsafe-"):
+                return
+        except (OSError, ValueError) as error:
+            # another process that tries the same folder makes and removes it, too
+            if not left or not isinstance(error, FileExistsError | FileNotFoundError):
+                raise ConfigurationError(where, key, str(path), f"a folder to write into ({_reason(error)})") from None
+        finally:
+            with suppress(OSError):  # somebody else has put something there meanwhile
+                for folder in reversed(made):
+                    folder.rmdir()
+        time.sleep(_PAUSE)
 
 
 def try_file(where: str, key: str, path: Path, *suffixes: str) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
 import typer
 import typer.main
+from amounts import some
 
 from qpsafe.cli import main
 from qpsafe.cli.outputs import try_file, try_folder
@@ -170,3 +172,11 @@ def test_a_disk_that_is_full_is_one_line(
         main.main()
     assert left.value.code == 1
     assert capsys.readouterr().err == f"qpsafe: {tmp_path / 'x.json'}: No space left on device\n"
+
+
+def test_those_who_try_one_folder_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "out" / "place"
+    with ThreadPoolExecutor(4) as pool:
+        for tried in [pool.submit(try_folder, "here", "--out", path) for _ in range(some(400, of=2000))]:
+            tried.result()
+    assert not any(left.is_file() for left in tmp_path.rglob("*"))  # who made a folder may find it in use
