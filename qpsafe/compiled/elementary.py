@@ -1,4 +1,4 @@
-"""Logarithm and angle without branches, for numbers and for lanes: within two units of the last place.
+"""Logarithm and angle without branches, for numbers and for lanes: within three units of the last place.
 
 Polynomials in the place of the C library's functions, which do one number at a time. What they approximate is known as
 a series; its shortest polynomial on the interval is found here, on import, by Chebyshev's interpolation. The leading

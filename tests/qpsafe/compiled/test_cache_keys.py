@@ -88,8 +88,10 @@ def modules_of(function: Any, seen: set[Any]) -> set[str]:
                     inside += [vars(value)[part] for part in code.co_names if part in vars(value)]
             elif isinstance(value, Dispatcher):
                 inside.append(value)
-            elif not callable(value) and not isinstance(value, CodeType):
+            elif not callable(value):
                 found.update(origins(home, name))
+            elif str(getattr(value, "__module__", "")).startswith("qpsafe."):  # taught to numba, or a tuple's class
+                found.add(value.__module__)
     for value in inside:
         if isinstance(value, Dispatcher):
             found |= modules_of(value.py_func, seen)
