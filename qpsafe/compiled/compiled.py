@@ -98,7 +98,7 @@ def entry(
         types_: Types of arguments and result.
         uses: Other modules whose compiled code goes into this one, beside this and `memory`. numba's cache notices
             changes of the entry's own file only; so the name it is kept under tells the state of these, and what was
-            linked in them and in its own: code in the cache that calls what is not there any more ends the process.
+            linked in them and in its own. Code in the cache that calls what is not there any more ends the process.
         nogil: Whether other threads may run meanwhile; memory that is handed in must then be the thread's own.
         python: Whether Python calls it; else only other compiled code does, by `linked`.
     """
