@@ -2,7 +2,7 @@
 
 qpsafe campaign run --controllers default --seed 6000000 --trials 3000 --out DEFAULT
 qpsafe campaign run --controllers stop --seed 6000000 --trials 3000 --out STOP
-python docs/data_paired.py judged-stop DEFAULT STOP
+python docs/data_paired.py judged-stop DEFAULT STOP  # and one of `brisk`
 
 Controllers that are played tick by tick take ten times as long as the default, and seldom change: their encounters may
 be of earlier days, as long as they are the same, which seed and motion tell. Where folders hold the same encounter of a
@@ -25,8 +25,8 @@ from qpsafe.sim.campaign.trials.rows import Columns, joined, of_controller
 
 #: Which controllers each file compares.
 CONTROLLERS = {
-    "verified": ("none", "stop", "strict", "unverified", "separation", "default"),
-    "judged-stop": ("default", "stop"),
+    "verified": ("none", "stop", "strict", "unverified", "separation", "brisk", "default"),
+    "judged-stop": ("default", "brisk", "stop"),
 }
 
 

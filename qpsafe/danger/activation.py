@@ -170,6 +170,36 @@ class Activation(Fixed):
         """Δ(1-ε) of the task of highest priority: beyond it the path is suspended (section IV-C)."""
         return self.thresholds[0].start
 
+    def scaled(self, *factors: float) -> Activation:
+        """Other thresholds with the same ε: work that goes on up to more danger costs less time, and protects less.
+
+        Args:
+            factors: What each Δ is multiplied by, one a level of danger, the highest priority first: of the position's
+                release, of the orientation's.
+
+        Returns:
+            The scaled activation of the same tasks.
+
+        Raises:
+            ConfigurationError: Not one number a level; a release would begin before the one below it is complete; or
+                an activation or a threshold of a derived class, of which nobody knows how it scales.
+        """
+        if type(self) is not Activation or not self._plain:
+            expected = "an Activation of Thresholds, not of classes derived from them"
+            raise ConfigurationError("Activation.scaled", "self", type(self).__name__, expected)
+        if len(factors) != len(self.levels):
+            raise ConfigurationError("Activation.scaled", "factors", factors, f"{counted(len(self.levels), 'factor')}")
+        expected = f"a number > 0, from {LEAST:g} to {MOST:g}"
+        own = [number("Activation.scaled", "factors", factor, expected, LEAST, most=MOST) for factor in factors]
+        levels = zip(self.levels, own, self.counts, strict=True)
+        return Activation(
+            tuple(
+                new
+                for level, factor, count in levels
+                for new in (Threshold(level.delta * factor, level.epsilon),) * count
+            )
+        )
+
     def switches(self, cdf_n: float) -> tuple[float, ...]:
         """The switches (m, f, ...) of eqs. (19), (21), one per level of danger, each in [0, 1]."""
         return tuple([threshold(cdf_n) for threshold in self.levels])

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from qpsafe.sim.campaign.report.measures import SHARES
 from qpsafe.sim.campaign.report.statistics import MEAN, Bootstrap, Estimate, McNemar, mcnemar
 from qpsafe.sim.campaign.runner import run_campaign
+from qpsafe.sim.campaign.trials.harm import harm
 from qpsafe.sim.campaign.trials.rows import Columns
-from qpsafe.sim.tuning.objectives import harm
 from qpsafe.sim.tuning.search import JUDGE
 
 if TYPE_CHECKING:
@@ -173,8 +173,7 @@ def compared(present: Columns, tuned: Columns, seed: int) -> Judged:
 
 
 def _objectives(rows: Columns) -> dict[str, Array]:
-    pairs = zip(rows["energy_share"].tolist(), rows["distance"].tolist(), strict=True)
-    harms = np.array([harm(share, distance) for share, distance in pairs])
+    harms = harm(rows["energy_share"], rows["distance"])
     return {"harm": harms, "lost": rows["lost_time"], "reversals": rows["reversals"].astype(float)}
 
 

@@ -1,13 +1,7 @@
 """What is minimised, and what no values may do: harm, work lost, and the constraints.
 
-Harm of an encounter is one number without a unit,
-
-    h = s/(1 + s) + ¼ exp(-max(d, 0)/0.1 m),
-
-with s the energy of the first contact over what the touched region may take (0 without contact), d the smallest true
-distance. The first term is the harm of a blow: ½ at the limit, never above 1, so that a single blow on a head, whose
-limit is low, is no more than one. The second gives a slope where contacts are rare. Work lost is the path time that is
-done where nobody comes less what was done [s]. Both are means over encounters.
+Harm is h of `qpsafe.sim.campaign.trials.harm`. Work lost is the path time that is done where nobody comes less what
+was done [s]. Both are means over encounters.
 """
 
 from __future__ import annotations
@@ -16,7 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-NEAR, SHARE = 0.1, 0.25  # [m], and of a contact without energy
+from qpsafe.sim.campaign.trials.harm import harm
+
 #: How often joints may turn round, against the present values on the same encounters: times, plus.
 CHATTER, CHATTER_LAGGED = (1.25, 2.0), (1.5, 2.0)
 
@@ -48,22 +43,10 @@ class Outcome(NamedTuple):
     def of(cls, row: Mapping[str, Any]) -> Outcome:
         """Of a campaign's row."""
         return cls(
-            harm(row["energy_share"], row["distance"]), float(row["lost_time"]), bool(row["contact"]),
+            float(harm(row["energy_share"], row["distance"])), float(row["lost_time"]), bool(row["contact"]),
             bool(row["furniture"]), bool(row["self"]), float(row["limit_excess"]), int(row["bad_ticks"]),
             int(row["reversals"]),
         )  # fmt: skip
-
-
-def harm(share: float, distance: float) -> float:
-    """h of an encounter.
-
-    Args:
-        share: Energy of the contact over the limit; NaN or 0 without one.
-        distance: Smallest true distance [m].
-    """
-    s = share if share > 0.0 else 0.0  # NaN: no contact
-    blow = s / (1.0 + s) if math.isfinite(s) else 1.0
-    return blow + SHARE * math.exp(-max(distance, 0.0) / NEAR)
 
 
 class Score(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qpsafe.sim.campaign.report.statistics import MEAN, MEDIAN, Array, Statistic
+from qpsafe.sim.campaign.trials.harm import harm
 from qpsafe.sim.campaign.trials.rows import Columns
 
 
@@ -150,6 +151,10 @@ FIGURES = (
     FigureMeasure(
         "distance_p10", "distance, 10 %", "mm", 1e3, 0, "smallest distance of a trial: a tenth of them keep less",
         _column("distance"), Statistic(0.1), True,
+    ),
+    FigureMeasure(
+        "harm_mean", "harm, mean", "1", 1.0, 4, "s/(1 + s) + ¼ exp(-d/0.1 m): s energy over its limit, d distance",
+        lambda rows: harm(rows["energy_share"], rows["distance"]), MEAN, True,
     ),
     FigureMeasure(
         "energy_mean", "energy, mean", "J", 1.0, 3, "energy of the first contact, 0 without one",

@@ -14,6 +14,14 @@ hand, we have not seen the standard itself. They agree with the energies that a 
 with (torso 1.6 J, upper arm 1.5, forearm 1.3, hand 0.49). The head, where contact is to be excluded, has the lowest
 value of skull and face and no factor: 0.03 J, a quarter of the 0.11 J that the same shield has. What our person has
 and the table has not (foot, board) is marked as ours.
+
+The harm of a whole encounter is one number without a unit, ours:
+
+    h = s/(1 + s) + ¼ exp(-max(d, 0)/0.1 m),
+
+with s the energy of the first contact over what the touched region may take (0 without contact), d the smallest true
+distance. The first term is the harm of a blow: ½ at the limit, never above 1, so that a single blow on a head, whose
+limit is low, is no more than one. The second gives a slope where contacts are rare.
 """
 
 from __future__ import annotations
@@ -22,7 +30,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.robot.models.mujoco_spec import weighed_model
 
@@ -30,6 +38,7 @@ if TYPE_CHECKING:
     from qpsafe.robot.robot import Robot
 
 Array = NDArray[np.float64]
+NEAR, SHARE = 0.1, 0.25  # of h: [m], and what a contact without energy has
 
 
 class Region(NamedTuple):
@@ -120,3 +129,16 @@ def effective_mass(robot: Robot, q: Array, jacobian: Array, normal: Array, paylo
     row = normal @ jacobian
     mobility = float(row @ np.linalg.solve(M, row))
     return math.inf if mobility < 1e-9 else 1.0 / mobility + payload
+
+
+def harm(shares: ArrayLike, distances: ArrayLike) -> Array:
+    """h of encounters, as they come: numbers or (n,).
+
+    Args:
+        shares: Energy of the contact over the limit; NaN or 0 without one.
+        distances: Smallest true distance [m].
+    """
+    given = np.asarray(shares, dtype=float)
+    s = np.where(given > 0.0, given, 0.0)  # NaN: no contact
+    blows = np.divide(s, 1.0 + s, out=np.ones_like(s), where=np.isfinite(s))
+    return blows + SHARE * np.exp(-np.maximum(distances, 0.0) / NEAR)

@@ -107,3 +107,38 @@ def test_tasks_apart_by_another_one_are_not_neighbours() -> None:
 
     with pytest.raises(ConfigurationError, match=r"thresholds\[2\]"):
         Activation((Threshold(11.5, 0.15), Threshold(7.5, 0.25), Threshold(11.5, 0.15)))
+
+
+factors = st.floats(0.01, 100.0)
+
+
+@given(danger, factors, st.integers(1, 3), st.integers(1, 3))
+def test_thresholds_and_danger_may_be_scaled_together(x: float, factor: float, high: int, low: int) -> None:
+    own = Activation((Threshold(11.5, 0.15),) * high + (Threshold(7.5, 0.25),) * low)
+    scaled = own.scaled(factor, factor)
+    assert scaled.counts == own.counts
+    assert scaled.activations(factor * x) == pytest.approx(own.activations(x), abs=1e-9)
+
+
+@given(danger, st.floats(1.0, 100.0), st.floats(1.0, 100.0))
+def test_higher_thresholds_release_less(x: float, high: float, low: float) -> None:
+    own = Activation()
+    high = max(high, low)  # Table I's condition stays met
+    for more, less in zip(own.scaled(high, low).activations(x), own.activations(x), strict=True):
+        assert more >= less
+
+
+@pytest.mark.parametrize(
+    "given_factors", [(), (2.0,), (2.0, 2.0, 2.0), (0.0, 1.0), (-1.0, 1.0), (math.nan, 1.0), ("2", 1.0), (1.0, 2.0)]
+)
+def test_factors_that_make_no_activation_are_refused(given_factors: tuple[float, ...]) -> None:
+    with pytest.raises(ConfigurationError):
+        Activation().scaled(*given_factors)
+
+
+def test_what_a_class_of_ones_own_switches_is_not_scaled_in_silence() -> None:
+    class Own(Activation):
+        pass
+
+    with pytest.raises(ConfigurationError, match="Own"):
+        Own().scaled(2.0, 2.0)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from qpsafe.sim.campaign.plan import Plan
+from qpsafe.sim.campaign.trials.harm import harm
 from qpsafe.sim.campaign.trials.rows import Columns, columns_of
 from qpsafe.sim.tuning.judge import Judged, compared, sentence
-from qpsafe.sim.tuning.objectives import harm
 
 PLAN = Plan(trials=200, controllers=("default",))
 ROWS = columns_of([row for k in range(200) for row in made_up_trials.run(PLAN, k)])

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qpsafe.sim.tuning.objectives import Outcome, harm, mean, score
+from qpsafe.sim.campaign.trials.harm import harm
+from qpsafe.sim.tuning.objectives import Outcome, mean, score
 
 SHARES, DISTANCES = st.floats(0.0, 1e6), st.floats(-1.0, 10.0)
 
