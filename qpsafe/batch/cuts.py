@@ -82,7 +82,7 @@ def own(floats: Any, integers: Any, at: Any, sizes: Any) -> Own:
         view(floats, at[13], (N, 6)),
         view(floats, at[14], (k, 5)),
         view(floats, at[15], (k, 4)),
-        view(floats, at[16], (k, 9)),
+        view(floats, at[16], (k, 10)),
         view(floats, at[17], (3,)),
         view(floats, at[18], (N,)),
         view(floats, at[19], (n,)),

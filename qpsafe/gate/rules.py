@@ -27,9 +27,10 @@ class VerifiedMotion(Fixed):
         approach: v_s, how fast a link may approach somebody whom it could touch [m/s]. Slow enough that a contact
             stays below every energy limit with an effective mass of 100 kg: ½ 100 · 0.05² = 0.13 J; ours.
         sidestep: For how long a person may go anywhere, sideways too, between what was seen and what is seen next [s]:
-            nobody within `person_speed` times this of a seen point is approached. 0.05 s are 8 cm; ours. With
-            infinity nobody is approached wherever they could have gone to by the time the robot stands: the strictest
-            promise, which near people allows hardly any motion, going away included.
+            nobody within `person_speed` times this of a seen point is approached. A tick and `latency`, rounded up: 4
+            cm, and what is seen next corrects the rest; ours. With infinity nobody is approached wherever they could
+            have gone to by the time the robot stands: the strictest promise, which near people allows hardly any
+            motion, going away included.
         escape: A link that, from rest, could not get away from who is near at this speed within 0.1 s stands still
             before it can be touched [m/s]: the turntable, the foot of the lower arm. 0: it goes on, and is touched
             while it moves, sideways for the most part. On the IRB 140 the foot of the lower arm is such a link; ours.
@@ -43,7 +44,7 @@ class VerifiedMotion(Fixed):
 
     def __init__(
         self, person_speed: float = 1.6, *, latency: float = 0.02, servo_lag: float = 0.0, person_error: float = 0.02,
-        approach: float = 0.05, margin: float = 0.004, sidestep: float = 0.05, escape: float = 0.2,
+        approach: float = 0.05, margin: float = 0.004, sidestep: float = 0.025, escape: float = 0.2,
     ) -> None:  # fmt: skip
         given = {
             "person_speed": person_speed, "latency": latency, "servo_lag": servo_lag, "person_error": person_error,

@@ -42,6 +42,7 @@ from qpsafe.sensing.detection import (
 )
 from qpsafe.sensing.health import CLEAR
 from qpsafe.sensing.sensing import DistanceSensing
+from qpsafe.sensing.velocity import unsettled
 
 if TYPE_CHECKING:
     from qpsafe.ranging.ranging import RangeSensing
@@ -188,7 +189,7 @@ class Sense:
             points[:count], links[:count], danger[:count], vectors[:count], cdf_n, qd0, notes, capped, more.near,
             more.leads,
         ))  # fmt: skip
-        return self._ended(seen, self._work, count if sensing.rules.velocities else 0, self._speeds)
+        return self._ended(seen, self._work, count if sensing.rules.velocities else 0, self._speeds, sensing.memory[-1])
 
     def _by_points(self, q: Array, qd: Array, value: ArrayLike, ages: ArrayLike | None, more: Ranged) -> Seen:
         if ages is not None:  # old points would count as seen now
@@ -249,7 +250,7 @@ class Sense:
         """q̇0 of the last tick (n,) [rad/s], where the compiled call needs it."""
         return self.parts[2].velocity if self._ours[1] else self._still
 
-    def _ended(self, seen: Seen, work: Array, moving: int, known: bool) -> Seen:
+    def _ended(self, seen: Seen, work: Array, moving: int, known: bool, track: Array | None = None) -> Seen:
         """What is left to do: the stages of another making, and to remember q̇0.
 
         Args:
@@ -257,10 +258,11 @@ class Sense:
             work: In which it worked; it holds the points' velocities.
             moving: How many of these.
             known: Whether it is known how fast every point moves.
+            track: Which spots know it, see `unsettled`; None without their readings.
         """
         _, field, evasion, _ = self.parts
         if not self._all_ours:
-            seen = self._asked(seen, field, evasion, work, moving, known)
+            seen = self._asked(seen, field, evasion, work, moving, known, track)
         elif not isfinite(seen.cdf_n):  # never into the filter, which remembers
             raise BadInput(_NOT_FINITE)
         else:
@@ -268,7 +270,7 @@ class Sense:
         return seen
 
     def _asked(
-        self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int, known: bool
+        self, seen: Seen, field: Any, evasion: Evasion, work: Array, moving: int, known: bool, track: Array | None
     ) -> Seen:  # fmt: skip
         """Danger and q̇0 by a field and an evasion that are asked method by method; arguments as for `_ended`."""
         n, m, memory = len(seen.qd0), len(self._robot.wire_frames), self._robot.memory
@@ -279,13 +281,12 @@ class Sense:
         torque, danger = np.empty(n), reals("the field's value", values, seen.danger.shape).copy()
         vectors = np.array(reals("the field's gradient", gradient, seen.points.shape), order="C")
         cdf_n = push_vectors(  # (6), (8), (14), (15)
-            danger, seen.links, work[:memory], self._robot.ends, *self._robot.wire_indices,
-            vectors, torque,
-        )  # fmt: skip
+            danger, seen.links, work[:memory], self._robot.ends, *self._robot.wire_indices, vectors, torque
+        )
         if not isfinite(cdf_n):
             raise BadInput(_NOT_FINITE)
         fastest = float(np.linalg.norm(velocities, axis=1).max()) if velocities is not None else 0.0
-        coming = fastest if known else inf
+        coming = fastest if known and not (track is not None and unsettled(track)) else inf
         qd0 = reals("the evasion's velocity", evade(evasion, torque, coming), torque.shape).copy()  # (16)
         if not np.isfinite(qd0).all():
             raise ValueError(f"the evasion's velocity is not finite: {qd0}")

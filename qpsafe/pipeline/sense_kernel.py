@@ -29,9 +29,10 @@ from qpsafe.ranging.ranged import DANGER, GRADIENT, PLACE, VELOCITY
 from qpsafe.robot import kinematics
 from qpsafe.robot.kinematics import Index, forward, wire_of
 from qpsafe.robot.wire import Wire
-from qpsafe.sensing import detection, readings
+from qpsafe.sensing import detection, readings, velocity
 from qpsafe.sensing.detection import find_nearest
 from qpsafe.sensing.readings import take_readings
+from qpsafe.sensing.velocity import unsettled_compiled as _unsettled
 
 # each is compiled once, for Python and for these calls
 _forward, _wire_of, _filter_by, _rub = linked(forward), linked(wire_of), linked(filter_by), linked(rub)
@@ -122,9 +123,9 @@ _stand = linked(stand, kinematics)
 
 
 @inline
-def _coming(own: int, velocities: Array, more: Array) -> float:
-    """How fast the fastest point moves [m/s], infinite where that is not known of one."""
-    if own > velocities.shape[0]:
+def _coming(own: int, velocities: Array, more: Array, track: Array) -> float:
+    """How fast the fastest point moves [m/s], infinite where that is not known of one, or not yet."""
+    if own > velocities.shape[0] or _unsettled(track):
         return inf
     most = 0.0
     for p in range(own):
@@ -138,11 +139,12 @@ def _coming(own: int, velocities: Array, more: Array) -> float:
 @inline
 def _evade(
     f: Array, i: Index, work: Array, moving: int, more: Array, points: Array, links: Index, values: Array,
-    vectors: Array, before: Array, qd0: Array,
+    vectors: Array, before: Array, track: Array, qd0: Array,
 ) -> float:  # fmt: skip
     """Danger, torque and q̇0 of the points; CDF_n, NaN if anything is not finite, or if the field is not ours.
 
-    The danger of the last points, `more`, is known already; as many of the others as `moving` says move.
+    The danger of the last points, `more`, is known already; as many of the others as `moving` says move, and `track`
+    tells which spots have seen theirs for long enough to know.
     """
     n, m = i[JOINTS], i[LINKS]
     weights = view(f, i[WEIGHTS], (4,))
@@ -169,7 +171,7 @@ def _evade(
     for j in range(n):
         if not isfinite(qd0[j]):
             cdf_n = nan
-    _rub(qd0, view(f, i[DROP], (n,)), _coming(own, view(work, a + n, (moving, 3)), more))
+    _rub(qd0, view(f, i[DROP], (n,)), _coming(own, view(work, a + n, (moving, 3)), more, track))
     return cdf_n
 
 
@@ -184,7 +186,7 @@ def _append(count: int, more: Array, more_links: Index, points: Array, links: In
 
 
 #: All the code that goes into both calls, but for the points.
-USES = (kinematics, push, ranged, *push.USES, link_field, *link_field.USES)
+USES = (kinematics, push, ranged, velocity, *push.USES, link_field, *link_field.USES)
 _ints, _outs = types.int64[::1], types.float64[:, ::1]
 _more = (readable(2), types.Array(types.int64, 1, "A", readonly=True))
 
@@ -227,7 +229,7 @@ def sense_readings(
     count = _append(count, more, more_links, points, links, velocities)
     cdf_n = _evade(
         f, i, work, moving, more, view(points, 0, (count, 3)), view(links, 0, (count,)), view(values, 0, (count,)),
-        view(vectors, 0, (count, 3)), before, qd0,
+        view(vectors, 0, (count, 3)), before, track, qd0,
     )  # fmt: skip
     return count, dying, out, cdf_n
 
@@ -261,7 +263,7 @@ def sense_points(
             for c in range(3):
                 velocities[p, c] = 0.0
         _append(count, more, more_links, points, links, velocities)
-    return total, _evade(f, i, work, 0, more, points, links, values, vectors, before, qd0)
+    return total, _evade(f, i, work, 0, more, points, links, values, vectors, before, view(work, 0, (0, 1)), qd0)
 
 
 Blocks = tuple[NDArray[np.float64], NDArray[np.int64]]

@@ -35,8 +35,9 @@ class ApproachVelocity(Fixed):
         self.alpha = min(dt / time_constant, 1.0)
         self.beta = self.alpha**2 / (2.0 - self.alpha)
         self.fastest = fastest
-        #: Columns: last reading, NaN for none; z - x; v, negative where it comes nearer; the spot's place, direction.
-        self.track = np.empty((count, 9))
+        #: Columns: last reading, NaN for none; z - x; v, negative where it comes nearer; the spot's place, direction;
+        #: for how long it has seen something [s].
+        self.track = np.empty((count, 10))
         self.reset()
 
     def reset(self) -> None:
@@ -52,6 +53,25 @@ _JUMP = 12.5
 STILL = 0.1
 #: A ray that sweeps over a slope reads it nearer and nearer; up to this slope that is no approach.
 SLOPE = 1.0
+
+#: Until something has been seen for so long its estimate has not settled, and nobody knows whether it comes [s].
+SETTLING = 0.1
+_PLACE, _DIRECTION, _SEEN = 3, 6, 9
+
+
+def unsettled(track: Array) -> bool:
+    """Whether any spot sees something that it has not seen for `SETTLING` yet.
+
+    Args:
+        track: As in `ApproachVelocity`.
+    """
+    new = False
+    for i in range(track.shape[0]):
+        new = new or (track[i, 0] == track[i, 0] and track[i, _SEEN] < SETTLING)
+    return new
+
+
+unsettled_compiled = inline(unsettled)
 
 
 @inline
@@ -78,11 +98,12 @@ def approach(
     """  # fmt: skip
     along, aside = 0.0, 0.0
     for j in range(3):
-        along += direction[j] * (origin[j] - track[i, 3 + j])
+        along += direction[j] * (origin[j] - track[i, _PLACE + j])
     for j in range(3):  # how the ray's own motion moves the point: along the ray, and aside
-        moved = origin[j] - track[i, 3 + j] + d * (direction[j] - track[i, 6 + j]) - along * direction[j]
+        moved = origin[j] - track[i, _PLACE + j] + d * (direction[j] - track[i, _DIRECTION + j]) - along * direction[j]
         aside += moved * moved
-        track[i, 3 + j], track[i, 6 + j] = origin[j], direction[j]
+        track[i, _PLACE + j], track[i, _DIRECTION + j] = origin[j], direction[j]
+    track[i, _SEEN] = track[i, _SEEN] + dt if fresh and track[i, 0] == track[i, 0] else 0.0
     change = d - track[i, 0] + along
     if fresh and abs(change) < _JUMP * dt:  # NaN fails: no reading before
         r = track[i, 1] + change - track[i, 2] * dt

@@ -122,11 +122,11 @@ def test_both_ways_rub_alike(seed: int, velocities: bool) -> None:
     made = [qpsafe.SafetyController(robot, tasks, evasion=evasion, sensing=sensing) for evasion in evasions]
     q, qd = robot.home, np.zeros(robot.nq)
     distances, rested, points = np.full(20, np.inf), 0, None
-    for k in range(300):
-        if k % 40 == 0:
+    for k in range(480):
+        if k % 80 == 0:  # what is new counts as coming for 25 ticks
             distances = np.where(rng.uniform(size=20) < 0.2, rng.uniform(0.2, 0.7, 20), np.inf)
-            points = rng.uniform(-0.6, 0.6, (2, 3)) if k % 120 == 80 else None
-        distances = distances - (k // 80 % 2) * 0.5 * DT  # stands, comes, stands
+            points = rng.uniform(-0.6, 0.6, (2, 3)) if k % 240 == 160 else None
+        distances = distances - (k // 160 % 2) * 0.5 * DT  # stands, comes, stands
         told = {"distances": np.maximum(distances, 0.1)} if points is None else {"points": points}
         ticks = [controller.step(q, qd, **told) for controller in made]
         a, b = (tick.qd0 for tick in ticks)
