@@ -150,7 +150,10 @@ def judged() -> str:
     for measures, summary in (
         ("contacts, moving, towards, over_limit, unseen, furniture, self", alone),
         ("distance_median, energy_mean, lost_time_mean, suspensions_mean, reversals_mean", alone),
-        ("less stop: contacts, moving, towards, over_limit, energy_mean, lost_time_mean", measured("judged-stop")),
+        (
+            "less stop: contacts, moving, towards, over_limit, harm_mean, energy_mean, lost_time_mean",
+            measured("judged-stop"),
+        ),
     ):
         lines = filled(f"<!-- campaign: {measures} -->\n<!-- campaign: end -->", summary).splitlines()
         tables.append("\n".join(lines[2:-2]))
@@ -158,6 +161,13 @@ def judged() -> str:
     which = f"ideal sensors, in the first {paired:,} of these, trial by trial:"
     tables.insert(2, f"The difference to `stop`, {which}")
     return "\n\n".join(tables)
+
+
+def brisk() -> str:
+    """The setting between the stop and the default, beside both, on the same encounters."""
+    marks = "<!-- campaign: contacts, moving, towards, over_limit, harm_mean, energy_mean, lost_time_mean -->"
+    lines = filled(f"{marks}\n<!-- campaign: end -->", measured("judged-stop")).splitlines()
+    return "\n".join(lines[2:-2])
 
 
 def tuned() -> str:
@@ -222,6 +232,7 @@ def _limits(share: dict[str, Any]) -> str:
 TABLES = {
     "floor": floor,
     "judged": judged,
+    "brisk": brisk,
     "tuned": tuned,
     "tuned-values": tuned_values,
     "worst": worst,

@@ -64,8 +64,8 @@ class Evasion:
     Friction is ours, not the paper's: M q̈0 + D q̇0 + c sgn(q̇0) = σ. An arm that creeps away from somebody who stands
     gains little room, and who is not seen touches it while it moves; with friction it comes to rest. It counts in full
     where no point comes nearer, not at all where one does at `STANDING` or faster, or nobody knows how fast. Who passes
-    by counts by the part of the velocity that comes nearer; what is held without being seen counts as standing. What a
-    spot has only just seen came from somewhere, and counts as coming.
+    by counts by the part of the velocity that comes nearer; what is held unseen counts as standing, what a spot has
+    only just seen as coming.
 
     Args:
         mass: M, scalar, (n,) diagonal or (n, n) symmetric positive definite.
@@ -75,8 +75,7 @@ class Evasion:
         friction: c, scalar or (n,), not negative [N m]; 0 where M or D is not diagonal.
 
     Raises:
-        ConfigurationError: A matrix of wrong shape or not symmetric positive definite, a negative friction or one
-            beside matrices that couple joints, or dt <= 0.
+        ConfigurationError: A matrix not symmetric positive definite; a friction < 0, or beside coupled joints; dt <= 0.
     """
 
     def __init__(

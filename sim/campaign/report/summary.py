@@ -15,7 +15,7 @@ from qpsafe.sim.campaign.report.comparisons import REFERENCES, Comparison, Judge
 from qpsafe.sim.campaign.report.findings import findings
 from qpsafe.sim.campaign.report.limits import limits_summary
 from qpsafe.sim.campaign.report.measures import FIGURES, SHARES
-from qpsafe.sim.campaign.report.statistics import CONFIDENCE, LEAST, Share, share
+from qpsafe.sim.campaign.report.statistics import CONFIDENCE, LEAST, RESAMPLES, Share, share
 from qpsafe.sim.campaign.report.swaps import FEW
 from qpsafe.sim.campaign.runner import Results
 from qpsafe.sim.campaign.trials.rows import CLASSES, Columns, of_controller
@@ -42,6 +42,7 @@ def summary(
     progress: Callable[[int, int], None] | None = None,
     speed: float | None = None,
     limits: Mapping[str, Sequence[Limit]] | None = None,
+    resamples: int = RESAMPLES,
 ) -> dict[str, Any]:
     """Everything that a report says, for JSON.
 
@@ -52,6 +53,7 @@ def summary(
         progress: Called with resamples done and wanted.
         speed: Of the engine with the default controller, see `engine_speed`; None where it was not timed.
         limits: What was possible in the contacts of some controllers; None where that was not searched.
+        resamples: Of the bootstrap, at least.
 
     Raises:
         ConfigurationError: No trial is finished.
@@ -60,7 +62,7 @@ def summary(
     if results.trials == 0:
         raise ConfigurationError("campaign", "trials", 0, "at least one that is finished")
     rows = {name: of_controller(results.columns, name) for name in plan.controllers}
-    judged = judge(rows, progress)
+    judged = judge(rows, progress, resamples)
     trials = results.columns["trial"]
     return {
         "controllers": {name: _controller(name, mine, judged) for name, mine in rows.items()},
