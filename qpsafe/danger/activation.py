@@ -171,18 +171,19 @@ class Activation(Fixed):
         return self.thresholds[0].start
 
     def scaled(self, *factors: float) -> Activation:
-        """Other thresholds with the same ε: work that goes on up to more danger costs less time, and protects less.
+        """Other thresholds with the same ε: with factors above 1 work goes on up to more danger, and protects less.
 
         Args:
-            factors: What each Δ is multiplied by, one a level of danger, the highest priority first: of the position's
-                release, of the orientation's.
+            factors: What each Δ is multiplied by, one a level of danger, the highest priority first; of two levels the
+                position's release, then the orientation's.
 
         Returns:
             The scaled activation of the same tasks.
 
         Raises:
-            ConfigurationError: Not one number a level; a release would begin before the one below it is complete; or
-                an activation or a threshold of a derived class, of which nobody knows how it scales.
+            ConfigurationError: Not one number a level; a Δ beyond 1e-100 to 1e100; a release would begin before the one
+                below it is complete, or with it; or an activation or a threshold of a derived class, of which nobody
+                knows how it scales.
         """
         if type(self) is not Activation or not self._plain:
             expected = "an Activation of Thresholds, not of classes derived from them"
@@ -191,14 +192,12 @@ class Activation(Fixed):
             raise ConfigurationError("Activation.scaled", "factors", factors, f"{counted(len(self.levels), 'factor')}")
         expected = f"a number > 0, from {LEAST:g} to {MOST:g}"
         own = [number("Activation.scaled", "factors", factor, expected, LEAST, most=MOST) for factor in factors]
-        levels = zip(self.levels, own, self.counts, strict=True)
-        return Activation(
-            tuple(
-                new
-                for level, factor, count in levels
-                for new in (Threshold(level.delta * factor, level.epsilon),) * count
-            )
-        )
+        scaled = [Threshold(level.delta * by, level.epsilon) for level, by in zip(self.levels, own, strict=True)]
+        found = Activation(tuple(new for new, count in zip(scaled, self.counts, strict=True) for _ in range(count)))
+        if found.counts != self.counts:
+            expected = "factors that leave levels apart: equal thresholds would be one level"
+            raise ConfigurationError("Activation.scaled", "factors", factors, expected)
+        return found
 
     def switches(self, cdf_n: float) -> tuple[float, ...]:
         """The switches (m, f, ...) of eqs. (19), (21), one per level of danger, each in [0, 1]."""

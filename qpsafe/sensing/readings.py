@@ -105,13 +105,14 @@ def take_readings(
 
         # what was seen and is lost still counts for a while
         reading = (reach if hit else np.inf) if usable else np.nan
+        known = held[i, 0] < np.inf
         present = believe(
             i, reading, new, p, origin, starts, ends, ranges[i, 0], hold_ticks, step, jump, d_min, held, age
         )
         speed = 0.0
         if moving:
             fresh = present and age[i] == 0
-            speed = approach(i, reading, fresh, origin, direction, dt, alpha, beta, fastest, track)
+            speed = approach(i, reading, fresh, known, origin, direction, dt, alpha, beta, fastest, track)
         if present:
             for c in range(3):
                 points[count, c], velocities[count, c] = held[i, 1 + c], speed * direction[c]

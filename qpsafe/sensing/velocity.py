@@ -56,6 +56,7 @@ SLOPE = 1.0
 
 #: Until something has been seen for so long its estimate has not settled, and nobody knows whether it comes [s].
 SETTLING = 0.1
+_ROUNDING = 1e-6  # of times that are summed up [s]
 _PLACE, _DIRECTION, _SEEN = 3, 6, 9
 
 
@@ -67,7 +68,7 @@ def unsettled(track: Array) -> bool:
     """
     new = False
     for i in range(track.shape[0]):
-        new = new or (track[i, 0] == track[i, 0] and track[i, _SEEN] < SETTLING)
+        new = new or (track[i, 0] == track[i, 0] and track[i, _SEEN] < SETTLING - _ROUNDING)
     return new
 
 
@@ -79,6 +80,7 @@ def approach(
     i: int,
     d: float,
     fresh: bool,
+    known: bool,
     origin: Vector,
     direction: Vector,
     dt: float,
@@ -93,6 +95,7 @@ def approach(
         i: Number of the spot.
         d: Its reading [m].
         fresh: Whether it is a reading of the same obstacle as before or of a new one; else the filter starts anew.
+        known: Whether anything was there before, seen or held: what is lost for a moment is not new when it is back.
         origin, direction: Of the spot now.
         dt, alpha, beta, fastest, track: As in `ApproachVelocity`.
     """  # fmt: skip
@@ -103,14 +106,16 @@ def approach(
         moved = origin[j] - track[i, _PLACE + j] + d * (direction[j] - track[i, _DIRECTION + j]) - along * direction[j]
         aside += moved * moved
         track[i, _PLACE + j], track[i, _DIRECTION + j] = origin[j], direction[j]
-    track[i, _SEEN] = track[i, _SEEN] + dt if fresh and track[i, 0] == track[i, 0] else 0.0
     change = d - track[i, 0] + along
     if fresh and abs(change) < _JUMP * dt:  # NaN fails: no reading before
         r = track[i, 1] + change - track[i, 2] * dt
         track[i, 1] = (1.0 - alpha) * r
         track[i, 2] += beta * r / dt
+        track[i, _SEEN] += dt
     else:
         track[i, 1] = track[i, 2] = 0.0
+        if fresh and (not known or abs(change) >= _JUMP * dt):  # somebody else; what was held is still the same
+            track[i, _SEEN] = 0.0
     track[i, 0] = d if fresh else np.nan
     if not fresh:
         return 0.0

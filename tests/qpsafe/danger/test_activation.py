@@ -142,3 +142,8 @@ def test_what_a_class_of_ones_own_switches_is_not_scaled_in_silence() -> None:
 
     with pytest.raises(ConfigurationError, match="Own"):
         Own().scaled(2.0, 2.0)
+
+
+def test_levels_do_not_become_one_in_silence() -> None:
+    with pytest.raises(ConfigurationError, match="apart"):
+        Activation((Threshold(10.0, 0.2), Threshold(5.0, 0.2))).scaled(1.0, 2.0)
