@@ -27,10 +27,10 @@ class VerifiedMotion(Fixed):
         approach: v_s, how fast a link may approach somebody whom it could touch [m/s]. Slow enough that a contact
             stays below every energy limit with an effective mass of 100 kg: ½ 100 · 0.05² = 0.13 J; ours.
         sidestep: For how long a person may go anywhere, sideways too, between what was seen and what is seen next [s]:
-            nobody within `person_speed` times this of a seen point is approached. A tick and `latency`, rounded up: 4
-            cm, and what is seen next corrects the rest; ours. With infinity nobody is approached wherever they could
-            have gone to by the time the robot stands: the strictest promise, which near people allows hardly any
-            motion, going away included.
+            nobody within `person_speed` times this of a seen point is approached. 4 cm, ours: more keeps the robot
+            from those who step round a link between two readings of slow sensors (of Sharps 6 cm), and from getting
+            out of the way sideways. With infinity nobody is approached wherever they could have gone to by the time
+            the robot stands: the strictest promise, which near people allows hardly any motion, going away included.
         escape: A link that, from rest, could not get away from who is near at this speed within 0.1 s stands still
             before it can be touched [m/s]: the turntable, the foot of the lower arm. 0: it goes on, and is touched
             while it moves, sideways for the most part. On the IRB 140 the foot of the lower arm is such a link; ours.

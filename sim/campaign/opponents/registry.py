@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from qpsafe.danger.evasion import Evasion
 from qpsafe.danger.separation_limit import SeparationLimit
-from qpsafe.danger.thresholds import SOURCE, robot_thresholds
+from qpsafe.danger.thresholds import SOURCE, robot_activation, robot_thresholds
 from qpsafe.errors import ConfigurationError, in_words
 from qpsafe.gate.rules import VerifiedMotion
 from qpsafe.laws.barrier import DangerBarrier
@@ -106,7 +106,8 @@ def _creeping(station: Station) -> SafetyController:
 
 
 def _brisk(station: Station) -> SafetyController:
-    return station.controller(activation=station.controller().activation.scaled(*BRISK))
+    count = len(station.robot.tool_frames)
+    return station.controller(activation=robot_activation(station.robot, count, count).scaled(*BRISK))
 
 
 def _apart(station: Station) -> SafetyController:

@@ -153,7 +153,7 @@ FIGURES = (
         _column("distance"), Statistic(0.1), True,
     ),
     FigureMeasure(
-        "harm_mean", "harm, mean", "1", 1.0, 4, "s/(1 + s) + ¼ exp(-d/0.1 m): s energy over its limit, d distance",
+        "harm_mean", "harm, mean", "1", 1.0, 4, "s/(1 + s) + ¼ exp(-d/0.1 m): s energy over its limit, d distance >= 0",
         lambda rows: harm(rows["energy_share"], rows["distance"]), MEAN, True,
     ),
     FigureMeasure(

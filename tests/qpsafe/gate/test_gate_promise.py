@@ -67,11 +67,12 @@ def test_who_steps_round_a_moving_link_is_told_or_not_approached(sidestep: float
         assert all(told.retreats)
         shorts += told.short
     assert shorts > 0 or sidestep > 0.0  # the plays ask for it
+    assert shorts <= 0.01 * 1_000 * some(1, of=3)  # rare: braking is enough in 99 of 100 ticks
 
 
 def test_more_is_let_through_where_people_step_aside_for_a_shorter_time() -> None:
     robot, rng = qpsafe.load_robot("irb140"), np.random.default_rng(5)
-    limits, times = JointLimits.of(robot), (0.0, 0.05, 0.2, math.inf)
+    limits, times = JointLimits.of(robot), (0.0, VerifiedMotion().sidestep, 0.05, 0.2, math.inf)
     gates = [Gate(robot, VerifiedMotion(sidestep=time), limits) for time in times]
     counts = np.zeros(len(times), dtype=int)
     for _ in range(300):
@@ -85,7 +86,7 @@ def test_more_is_let_through_where_people_step_aside_for_a_shorter_time() -> Non
             passed.append(not gated.cause)
         assert passed == sorted(passed, reverse=True)
         counts += passed
-    assert counts[0] > counts[1] > counts[-1]
+    assert counts[0] > counts[2] > counts[-1]
 
 
 @pytest.mark.slow

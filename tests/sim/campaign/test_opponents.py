@@ -166,6 +166,20 @@ def test_the_guide_says_what_every_controller_is() -> None:
         assert f"| `{name}` | {opponent(name).sentence} |" in page
 
 
+@pytest.mark.parametrize("robot", ["irb140", "iiwa14", "irb14000"])
+def test_brisk_is_the_default_with_later_thresholds_and_pages_say_how_much(robot: str) -> None:
+    place = station(robot, "hold")
+    brisk, default = (opponent(name).make(place).activation for name in ("brisk", "default"))
+    assert brisk.counts == default.counts
+    for one, other, factor in zip(brisk.levels, default.levels, registry.BRISK, strict=True):
+        assert (one.delta, one.epsilon) == (pytest.approx(factor * other.delta), other.epsilon)
+    high, low = registry.BRISK
+    docs = Path(__file__).resolve().parents[3] / "docs"
+    for page in ("explanation/verified-motion.md", "how-to/tuning.md", "../CHANGELOG.md"):
+        assert f"scaled({high}, {low})" in (docs / page).read_text(encoding="utf-8"), page
+    assert f"up to {high:.0f} times, orientation up to {low} times" in opponent("brisk").sentence
+
+
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), -float("inf")])
 @pytest.mark.parametrize("when", [0, 3])
 def test_a_clock_that_is_no_number_is_a_fault_and_no_work(wrong: float, when: int) -> None:
