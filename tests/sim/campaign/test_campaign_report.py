@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shlex
 from collections import Counter
@@ -135,6 +136,23 @@ def test_few_controllers_and_a_single_trial_make_a_report(controllers: tuple[str
     found = summary(made)
     assert list(found["controllers"]) == list(controllers)
     assert "default" not in controllers or "--controller default" in report_page(made, found)
+
+
+def test_more_resamples_may_be_asked_for(results: Results) -> None:
+    few, more = summary(results), summary(results, resamples=3 * summary(results)["statistics"]["resamples"])
+    assert more["statistics"]["resamples"] == 3 * few["statistics"]["resamples"]
+    for name, found in few["controllers"].items():
+        assert more["controllers"][name]["contacts"] == found["contacts"]
+
+
+def test_harm_is_the_blow_and_how_near_it_came(results: Results) -> None:
+    found = summary(results)["controllers"]
+    for name in PLAN.controllers:
+        rows, total = of_controller(results.columns, name), 0.0
+        for share, distance in zip(rows["energy_share"].tolist(), rows["distance"].tolist(), strict=True):
+            blow = share / (1.0 + share) if share == share else 0.0
+            total += blow + 0.25 * math.exp(-max(distance, 0.0) / 0.1)
+        assert found[name]["harm_mean"] == pytest.approx(total / len(rows["trial"]), rel=1e-5)
 
 
 def test_no_trial_makes_none(results: Results) -> None:
